@@ -1,1 +1,1 @@
-"""The plan: what a camera does to a light field as plain data, and the compiler that makes it."""
+"""The plan: the effect of a camera on a light field as plain data, and the compiler that makes it."""

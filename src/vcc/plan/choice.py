@@ -1,4 +1,4 @@
-"""Which core a plan gets: footprints where the optics allow them, else rays."""
+"""Choice of a plan's core: footprints if the optics allow them, else rays."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from vcc.plan.rays.compile import ByRays, RayChoices
 
 
 def compile_best(train: Train, grid: Grid, how: How | None = None, parts: Parts = NONE_KEPT) -> Plan:
-    """The plan by which an engine makes the picture that an optical train makes of a light field.
+    """The plan for the image that an optical train makes of a light field.
 
     Args:
         train: the optics and the sensor.
         grid: of the light field.
-        how: what was chosen; None takes the defaults.
-        parts: asked between stages whether the plan is still wanted.
+        how: the options; None uses the defaults.
+        parts: checked between stages, so that planning can be cancelled.
 
     Raises:
-        InputError: options that do not go with one another, or an element that returns what it must not.
+        InputError: options that do not go together, or an element that returns invalid values.
     """
     return _Making(train, grid, how or How(), parts=parts).known
 
@@ -42,15 +42,15 @@ def compile_best(train: Train, grid: Grid, how: How | None = None, parts: Parts 
 def decide(
     train: Train, grid: Grid, how: How | None = None, leaving: Iterable[str] = (), parts: Parts = NONE_KEPT
 ) -> Choices:
-    """All that is chosen of a plan whose numbers are to follow the train's parameters.
+    """All choices of a plan whose parameters are to follow the train's parameters.
 
     Args:
-        train: the optics and the sensor as they are now.
+        train: the optics and the sensor in their current state.
         grid: of the light field.
-        how: what was chosen by the user; None takes the defaults.
-        leaving: labels of elements that may leave the plane of the views. What stands there is otherwise taken for
-            one weight a view, and must stay.
-        parts: keeps what is costly.
+        how: the user's options; None uses the defaults.
+        leaving: labels of elements that may leave the plane of the views. Other elements there become one weight a
+            view, and must stay.
+        parts: caches costly results.
 
     Raises:
         InputError: as `compile_best`.
@@ -59,17 +59,17 @@ def decide(
 
 
 def compute(train: Train, grid: Grid, how: How | None, choices: Choices, parts: Parts = NONE_KEPT) -> Computed:
-    """The plan that was decided on for a train nearby: its numbers follow the train's parameters smoothly.
+    """The plan for a nearby train by choices made before: its parameters follow the train's parameters smoothly.
 
     Args:
         train: the optics and the sensor.
         grid: of the light field, for which the choices were made.
-        how: likewise.
+        how: the options, for which the choices were made.
         choices: of `decide`.
-        parts: keeps what is costly.
+        parts: caches costly results.
 
     Raises:
-        InputError: an element that returns what it must not, or a train for which the choices no longer hold.
+        InputError: an element that returns invalid values, or a train for which the choices no longer hold.
     """
     making = _Making(train, grid, how or How(), choices, Follow(), parts)
     check_unchanged("the order of the elements", choices.elements, making.elements)
@@ -78,16 +78,16 @@ def compute(train: Train, grid: Grid, how: How | None, choices: Choices, parts: 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Choices(Brief):
-    """All that is chosen of a plan; `vcc.plan.following.differences` compares two.
+    """All choices of a plan; `vcc.plan.following.differences` compares two.
 
     Args:
-        missing: what the light field lacks of the rays that are asked for, and that in words.
-        views_between: the grid with views in between, how they are made (None: they need none), and why; None
-            where they are not asked for.
+        missing: requested rays that the light field lacks, and a note as text.
+        views_between: the grid with views in between, how they are synthesized (None: not needed), and why; None
+            if not requested.
         elements: kinds and names of the elements in their order.
         why_rays: why rays are traced; None for footprints.
-        dense: of the plan of the views in between; else None.
-        plain: of the plan of the views as they are beside these; else None.
+        dense: choices of the plan for the grid with views in between; else None.
+        plain: choices of the additional plan for the original views; else None.
         footprints: of a plan by footprints; else None.
         rays: of a plan by rays; else None.
     """
@@ -106,10 +106,10 @@ class Choices(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Computed(Brief):
-    """A plan, and which of its numbers are linear in what elements hold.
+    """A plan, and its parameters that are linear in parameters of elements.
 
     Args:
-        plan: how to make the picture.
+        plan: of the image.
         linears: see `vcc.plan.following.Linear`.
     """
 
@@ -118,15 +118,15 @@ class Computed(Brief):
 
 
 class _Making:
-    """The stages of any plan: which core it gets, and that core's own stages.
+    """The stages of any plan: the choice of the core, and the core's own stages.
 
     Args:
         train: see `compile_best`.
-        grid: likewise.
-        how: likewise.
-        choices: by which the plan is made; None chooses now.
-        follow: whether its numbers are to follow a camera.
-        parts: what is kept of plans nearby.
+        grid: see `compile_best`.
+        how: see `compile_best`.
+        choices: for the plan; None chooses now.
+        follow: given if parameters are to follow a camera.
+        parts: cached parts of nearby plans.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class _Making:
 
     @property
     def choices(self) -> Choices:
-        """All that is chosen."""
+        """All choices."""
         by, dense = self.by, self.how.between_views == "depth"
         return Choices(
             elements=self.elements,
@@ -163,16 +163,16 @@ class _Making:
 
     @property
     def linears(self) -> tuple[Linear, ...]:
-        """Which numbers of the plan are linear in what elements hold."""
+        """The parameters of the plan that are linear in parameters of elements."""
         return self.by.linears
 
     @property
     @cached
     def blurs(self) -> Blurs | str:
-        """What the diffusers come to where the picture is made by footprints; else why it is not, in words.
+        """The blurs that replace the diffusers if footprints make the image; else why they do not, as text.
 
         Raises:
-            InputError: it was made by footprints, and cannot be any longer.
+            InputError: the choices were made for footprints, which are no longer possible.
         """
         if self.how.method == "rays":
             return "asked for"
@@ -194,7 +194,7 @@ class _Making:
     @property
     @cached
     def choose_missing(self) -> tuple[Missing, str]:
-        """What the light field lacks of the rays that are asked for, and that in words."""
+        """Requested rays that the light field lacks, and a note as text."""
         if self.chosen:
             return self.chosen.missing
         asked = AskedLight.of(self.train, self.grid)
@@ -203,17 +203,17 @@ class _Making:
     @property
     @cached
     def choose_views_between(self) -> tuple[Grid, ViewsBetween | None, str]:
-        """The grid with views in between, how they are made, and why."""
+        """The grid with views in between, how they are synthesized, and why."""
         chosen = self.chosen.views_between if self.chosen else None
         return chosen or denser(self.train, self.grid)
 
     @property
     @cached
     def by(self) -> ByFootprints | ByRays | _Making:
-        """The stages of the core: by footprints, by rays, or those of the plan for a grid with views in between.
+        """The stages of the core: by footprints, by rays, or of the plan for a grid with views in between.
 
         Raises:
-            InputError: options that do not go with one another.
+            InputError: options that do not go together.
         """
         blurs, how, chosen = self.blurs, self.how, self.chosen
         if how.between_views == "depth":
@@ -239,7 +239,7 @@ class _Making:
     @property
     @cached
     def plain(self) -> _Making:
-        """The stages of the plan for the views as they are, beside one with views in between."""
+        """The stages of the plan for the original views, in addition to one with views in between."""
         return self._of_grid(self.grid, "none", self.chosen.plain if self.chosen else None)
 
     def _of_grid(self, grid: Grid, between_views: Literal["auto", "none"], choices: Choices | None) -> _Making:
@@ -248,7 +248,7 @@ class _Making:
 
     @property
     def plan(self) -> Plan:
-        """How to make the picture."""
+        """The plan of the image."""
         plan = self.by.plan
         if self.how.between_views != "depth":
             return plan
@@ -265,13 +265,13 @@ class _Making:
 
     @property
     def known(self) -> Plan:
-        """The plan with what it was made for, and what its light field lacks."""
+        """The plan with the camera that it was made for, and the missing light."""
         plan = self.plan
         return _known(plan, self.train, self.grid, *self.choose_missing)
 
 
 def _check_rays(how: How, reason: str) -> None:
-    """Refuse options that are not for pictures made by rays."""
+    """Raise an error for options that images by rays do not support."""
     if how.method == "footprints":
         raise InputError(f"this camera's picture cannot be made by footprints: {reason}. Use method='rays'")
     for name, value, fine in (
@@ -286,7 +286,7 @@ def _check_rays(how: How, reason: str) -> None:
 
 
 def _known(plan: Plan, train: Train, grid: Grid, missing: Missing, words: str) -> Plan:
-    """A plan with what it was made for, and what its light field lacks."""
+    """A plan with the camera that it was made for, and the missing light."""
     return replace(
         plan,
         grid_shape=grid.shape[:4],
@@ -300,16 +300,16 @@ def _known(plan: Plan, train: Train, grid: Grid, missing: Missing, words: str) -
 def compiled_each(
     trains: Sequence[Train], grid: Grid, how: How, seeds: Sequence[int] | None = None
 ) -> Iterator[Plan] | list[Plan]:
-    """The plans of several trains, as `compile_best` makes each of them; what they share is made once.
+    """The plans of several trains, as `compile_best` makes each of them; common parts are computed once.
 
     Args:
         trains: several, or none.
         grid: of the light field.
-        how: what was chosen.
-        seeds: of rays, one for each train; None takes that of ``how`` for all.
+        how: the options.
+        seeds: of rays, one for each train; None uses the seed of ``how`` for all.
 
     Returns:
-        A list of plans that differ in one mask, all there; else each as it is asked for.
+        A list if the plans differ in one mask only; else an iterator that makes each plan on request.
 
     Raises:
         InputError: as `compile_best`.
@@ -328,7 +328,7 @@ def compiled_each(
 
 
 def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
-    """The pictures of several trains, or of many of them, as sums of fewer pictures; None where that is not so."""
+    """The images of several trains, or of many of them, as sums of fewer images; None if not possible."""
     codes = _codes(trains, how)
     mixture = None if codes is None else codes.mixture(grid, how)
     if codes is None or mixture is None:
@@ -339,6 +339,6 @@ def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
 
 
 def _codes(trains: Sequence[Train], how: How) -> Codes | None:
-    """What trains differ in, if that is the cells of one mask, and pictures are made by footprints."""
+    """The common description of trains if they differ in the cells of one mask, and footprints make the images."""
     alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
     return None if alone or len(trains) < 2 else Codes.of(trains)

@@ -1,7 +1,7 @@
-"""How two arrays agree when one is moved over the other: what derivatives to the weights of a filter are.
+"""Correlation of two arrays: the derivatives to the weights of a filter.
 
 A filter's output is Σ_m weight[m] · x[r − m], so that with weights G of the output the derivative to weight m is
-Σ_r G[r] · x[r − m], the correlation of G with x at the lag m. It is wanted at as many lags as there are weights.
+Σ_r G[r] · x[r − m], the correlation of G with x at the lag m. It is computed at as many lags as there are weights.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FEW = 64
-"""Lags up to which sums of products take less time than Fourier transforms."""
+"""Number of lags up to which direct sums of products are faster than Fourier transforms."""
 
 
 def correlated(one: NDArray[np.floating], other: NDArray[np.floating], down: range, across: range) -> Array:
@@ -20,9 +20,9 @@ def correlated(one: NDArray[np.floating], other: NDArray[np.floating], down: ran
 
     Args:
         one: (rows, columns, channels); channels are summed.
-        other: likewise, of its own rows and columns: dark beyond them.
-        down: lags m along rows, one after another.
-        across: lags n along columns, likewise.
+        other: likewise, with its own numbers of rows and columns; zero outside.
+        down: consecutive lags m along rows.
+        across: consecutive lags n along columns.
 
     Returns:
         (lags down, lags across), in double precision.
@@ -42,7 +42,7 @@ def _one_by_one(one: Array, other: Array, down: range, across: range) -> Array:
 
 
 def _both(one: int, other: int, lag: int) -> tuple[slice, slice]:
-    """Where an axis of ``one`` numbers and one of ``other``, moved by a lag, lie over each other."""
+    """The overlap of an axis of ``one`` numbers with one of ``other`` numbers, moved by a lag."""
     first, stop = max(lag, 0), max(min(one, other + lag), max(lag, 0))
     return slice(first, stop), slice(first - lag, stop - lag)
 
@@ -50,12 +50,12 @@ def _both(one: int, other: int, lag: int) -> tuple[slice, slice]:
 def _by_transforms(one: Array, other: Array, down: range, across: range) -> Array:
     from scipy.fft import irfft2, next_fast_len, rfft2
 
-    # Lags that differ by the size of the transforms are not told apart: of those, one at most finds anything.
+    # Lags that differ by the size of the transforms coincide: at most one of them has an overlap.
     size = [
         next_fast_len(max(mine, theirs, theirs + lags[-1], mine - lags[0]), real=True)
         for mine, theirs, lags in zip(one.shape[:2], other.shape[:2], (down, across), strict=True)
     ]
-    # Channels first: transforms run along the last axes. What they share is summed before it is turned back.
+    # Channels first: transforms run along the last axes. Channels are summed before the inverse transform.
     spectra = (rfft2(np.moveaxis(array, 2, 0), size) for array in (one, other))
     product = next(spectra) * np.conj(next(spectra))
     found = irfft2(product.sum(axis=0), size)

@@ -1,9 +1,9 @@
-"""Which of the light that a camera asks for a light field lacks.
+"""Light that a camera requests and a light field lacks.
 
-A camera asks for all light that its stops let through: rays from all over the sensor through every rim and every
-bounded mask, each with the share that all elements leave of it, traced back to the light field. What of it falls
-outside the grid of views, or outside the views' pictures, is missing. Where no stop bounds the slopes of rays, the
-grid of views is the aperture, by convention.
+A camera requests all light that its stops transmit: rays from all over the sensor through every rim and every
+bounded mask, each weighted by the transmission of all elements, traced back to the light field. Light from outside
+the grid of views, or from outside the views' images, is missing. If no stop bounds the slopes of rays, the grid of
+views is the aperture by convention.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ Array = NDArray[np.float64]
 Held = NDArray[np.bool_]
 
 RAYS = 2**16
-"""Evenly spread over the sensor and over what bounds the light: shares are right to 0.1 %."""
+"""Rays, evenly spread over the sensor and over the bounds of the light: shares are accurate to 0.1 %."""
 BORDER = 1e-6
-"""Of a cell or a sample, by which rays may pass the border: a stop as wide as the grid of views misses nothing."""
+"""Tolerance at borders, as a share of a cell or a sample: a stop as wide as the grid of views misses nothing."""
 WORTH_SAYING = 1e-3
-"""Share of the light from which on a reason names what cuts it."""
+"""Share of the light above which a reason names what cuts it off."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Missing(Brief):
-    """What a light field lacks.
+    """Light that a light field lacks.
 
     Args:
-        share: of the light that the camera asks for.
-        reason: in words; empty where hardly anything is missing.
+        share: of the light that the camera requests.
+        reason: as text; empty if hardly anything is missing.
     """
 
     share: float
@@ -56,9 +56,9 @@ class Missing(Brief):
         """From amounts of light.
 
         Args:
-            amounts: all that is asked for, what of it is within the grid of views, and what of that is within the
-                views' pictures, in any unit.
-            stop: what bounds the light.
+            amounts: all that is requested, the part of it within the grid of views, and the part of that within
+                the views' images, in any unit.
+            stop: the element that bounds the light.
         """
         asked, in_views, held = map(float, amounts)
         if asked <= 0:
@@ -74,12 +74,12 @@ class Missing(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AskedLight(Brief):
-    """The light that a camera asks for.
+    """The light that a camera requests.
 
     Args:
         path: of the camera.
-        aimed: what bounds the light; None where all light comes from one place.
-        by_views: whether that is the grid of views, as no stop does.
+        aimed: bounds of the light; None if all light comes from one place.
+        by_views: whether the grid of views is the bound, because no stop is.
     """
 
     path: Path
@@ -88,17 +88,17 @@ class AskedLight(Brief):
 
     @classmethod
     def of(cls, train: Train, grid: Grid) -> AskedLight:
-        """That of an optical train before a light field."""
+        """The light that an optical train requests of a light field."""
         path = Path(train, grid, np.zeros((2, 2)), RAYS)
         try:
             aimed = settled(path, everything=False, windows_only=True)
-        except InputError:  # rays are not bound by anything: what makes the picture says so
+        except InputError:  # rays are unbounded: the compiler of the image reports it
             return cls(path, None, False)
         return cls(path, aimed, not path.stops_bound)
 
     @property
     def words(self) -> str:
-        """What bounds the light, for an account of a plan."""
+        """The bound of the light, as a note of a plan."""
         if self.by_views:
             return (
                 "no stop bounds the light that reaches the sensor: the grid of views is taken for the aperture. "
@@ -113,7 +113,7 @@ class AskedLight(Brief):
     @property
     @cached
     def missing(self) -> Missing:
-        """What of it the light field lacks."""
+        """The requested light that the light field lacks."""
         if self.aimed is None or self._bounds_are_held():
             return Missing(0.0, "")
         share, in_views, in_pictures = self._traced
@@ -122,11 +122,11 @@ class AskedLight(Brief):
         return Missing.of(amounts, self._stop)
 
     def missing_with(self, number: int, cells: Sequence[Cells]) -> list[Missing]:
-        """The same with other cells of one size in a mask, whose own are all open, of optics that are affine.
+        """The missing light with other cells in a mask whose own cells are all open, for affine optics.
 
         Args:
             number: of the mask among the elements.
-            cells: several.
+            cells: several, of one size.
         """
         if self.aimed is None or self._bounds_are_held():
             return [Missing(0.0, "")] * len(cells)
@@ -137,7 +137,7 @@ class AskedLight(Brief):
         row, column = cells[0].cells_at(x, y)
         met = (row >= 0) & (column >= 0)
         place, shape = (row * cells[0].values.shape[1] + column)[met], cells[0].values.size
-        # Light is linear in the cells: by each of them so much passes.
+        # Light is linear in the cells: sum the light through each cell.
         asked, viewed, held = (
             np.bincount(place, weights=(share * part)[met], minlength=shape)
             for part in (np.ones(len(share)), in_views, in_views & in_pictures)
@@ -149,7 +149,7 @@ class AskedLight(Brief):
     @property
     @cached
     def _core(self) -> Rays:
-        """Rays from all over the sensor, which is one pixel to them, to what bounds the light."""
+        """Rays from the whole sensor, treated as one pixel, to the bounds of the light."""
         assert self.aimed is not None
         sensor, path = self.path.train.sensor, self.path
         met = steps_met(path, self.aimed, coarse=True)
@@ -175,7 +175,7 @@ class AskedLight(Brief):
     @property
     @cached
     def _traced(self) -> tuple[Array, Held, Held]:
-        """What passes of each ray, and whether it comes from within the grid of views, and within the pictures."""
+        """Transmission of each ray, and whether it comes from within the grid of views, and within the images."""
         rays = self._core.traced(np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
         Move(self._core.index_from_ray)(rays)
         within = [
@@ -183,7 +183,7 @@ class AskedLight(Brief):
             for index, size in zip((rays.x, rays.y, rays.s, rays.t), self.path.size, strict=True)
         ]
         in_pictures = within[2] & within[3]
-        if not self.path.index_from_sensor.matrix[:2, 2:4].any():  # a pixel sees one view, whatever it shows
+        if not self.path.index_from_sensor.matrix[:2, 2:4].any():  # a pixel sees one view, whatever its content
             in_pictures = np.ones_like(in_pictures)
         return rays.share.ravel(), within[0] & within[1], in_pictures
 
@@ -195,7 +195,7 @@ class AskedLight(Brief):
         return np.stack([each.ravel() for each in np.broadcast_arrays(rays.x, rays.y, rays.s, rays.t)], axis=-1)
 
     def _bounds_are_held(self) -> bool:
-        """Whether the light field holds all light, by bounds of it that are quickly found."""
+        """Whether the light field contains all requested light, by quickly computed bounds."""
         assert self.aimed is not None
         extents = _extents(self.path, self.aimed.aim)
         if extents is None:
@@ -208,7 +208,7 @@ class AskedLight(Brief):
 def _extents(path: Path, aim: Aim) -> tuple[Array, Array] | None:
     """The lowest and the highest index (i, j, k, l) of rays that pass all stops, or bounds of them.
 
-    None where something bends or scatters rays otherwise than lenses and prisms do, or x and y mix.
+    None if an element other than a lens or prism bends or scatters rays, or x and y mix.
     """
     maps = [path.index_from_sensor, *(leg.from_sensor for leg in path.legs)]
     bent = any(leg.stage.faces.bending is not None or leg.stage.faces.spread is not None for leg in path.legs)
@@ -232,7 +232,7 @@ def _extents(path: Path, aim: Aim) -> tuple[Array, Array] | None:
 
 
 def _cut(corners: Array, along: Array, end: float) -> Array:
-    """What of a convex polygon lies where along · (x, s, 1) is at most ``end`` (Sutherland and Hodgman 1974)."""
+    """The part of a convex polygon in which along · (x, s, 1) is at most ``end`` (Sutherland and Hodgman 1974)."""
     if not np.isfinite(end) or corners.size == 0:
         return corners
     beyond = along[:2] @ corners + along[2] - end

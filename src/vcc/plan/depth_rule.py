@@ -1,8 +1,8 @@
-"""How to fill the gaps between views by depth: as many views in between as the sensor can tell apart.
+"""Filling gaps between views by depth: the number of views in between that the sensor can resolve.
 
-A view stands for a cell of the aperture. Where the pictures of a point that neighbouring views throw on the sensor
-lie more than a pixel apart, each cell is divided, and what the scene looks like from the middle of each part is
-made of the views and their disparities (`vcc.engines.depth_views`). The denser light field is then like any other.
+A view stands for a cell of the aperture. If neighbouring views' images of a point on the sensor are more than a
+pixel apart, each cell is divided, and the view from the middle of each part is synthesized from the views and
+their disparities (`vcc.engines.depth_views`). The denser light field is then used like any other.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from vcc.optics.train import Train
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-6
-"""Gaps are to be less than what the sensor tells apart, by so much of it: what is left is summed plainly."""
+"""Share by which gaps are to be smaller than the sensor's resolution: the remaining gaps are not filled."""
 MOST_TIMES = 16
-"""Into how many parts a view's cell is divided at most, each way: the cost grows with the square."""
+"""Largest number of parts of a view's cell, each way: the cost grows with the square."""
 
 
 @dataclass(frozen=True)
 class Parallax:
-    """What a disparity along u means along v, and which of two is nearer.
+    """Conversion of disparities along u to disparities along v, and the order of depth.
 
     Args:
-        sign: sign · disparity is larger for what is nearer: −1 where the frame mirrors views against pixels.
-        along_v: (n₀, n₁, m₀, m₁); what has the disparity d along u has (n₀ + n₁·d) / (m₀ + m₁·d) along v.
+        sign: sign · disparity is larger for nearer objects: −1 if the frame mirrors views against pixels.
+        along_v: (n₀, n₁, m₀, m₁); a disparity d along u is (n₀ + n₁·d) / (m₀ + m₁·d) along v.
     """
 
     sign: float
@@ -43,13 +43,13 @@ class Parallax:
 
     @classmethod
     def of(cls, frame: Affine) -> Parallax:
-        """As a light field's frame says.
+        """From a light field's frame.
 
         A point at 1/Z sends rays with s − u/Z constant, so that d = (∂s/∂i − ∂u/∂i/Z) / (∂s/∂k − ∂u/∂k/Z);
         likewise along v. Solved for the homogeneous Z, which is finite at infinity.
 
         Raises:
-            InputError: a frame that turns view axes against those of pixels.
+            InputError: a frame whose view axes are rotated against the pixel axes.
         """
         if not axes_agree(frame):
             raise InputError(
@@ -67,19 +67,19 @@ class Parallax:
         return cls(float(np.sign(uk * si - ui * sk)), (n0, n1, m0, m1))
 
     def down(self, disparities: Array) -> Array:
-        """Disparities along v of those along u."""
+        """Disparities along v for disparities along u."""
         n0, n1, m0, m1 = self.along_v
         return np.asarray((n0 + n1 * disparities) / (m0 + m1 * disparities))
 
 
 @dataclass(frozen=True, eq=False)
 class ViewsBetween(Value):
-    """A denser light field, as a plan has it: pure numbers.
+    """A denser light field as part of a plan: pure numbers.
 
     Args:
-        times: into how many parts (down, across) the cell of each view is divided.
-        maps: disparities of the light field that there is.
-        parallax: what they mean.
+        times: number of parts (down, across) into which the cell of each view is divided.
+        maps: disparities of the original light field.
+        parallax: conversion of the disparities.
     """
 
     times: tuple[int, int]
@@ -91,7 +91,7 @@ class ViewsBetween(Value):
         return (given[0] * self.times[0], given[1] * self.times[1], *given[2:])
 
     def cautions(self) -> tuple[str, ...]:
-        """Warn of disparities that were searched for and not found."""
+        """Warnings of disparities that were searched for and not found."""
         if self.maps.unmatched <= MANY_UNMATCHED:
             return ()
         low, high = self.maps.extent
@@ -105,23 +105,24 @@ class ViewsBetween(Value):
 
 
 def on_sensor(train: Train, grid: Grid) -> tuple[Array, Array]:
-    """Where samples land, pixels (column, row): a step of each index (i, j, k, l), 2×4, and the first sample."""
+    """Places of samples, pixels (column, row): steps of the indices (i, j, k, l), 2×4, and the first sample."""
     pixels = train.sensor.frame.inverse()
     rays = train.rays_at(train.sensor.z) @ grid.frame
     return pixels.linear @ rays.linear[:2], pixels.linear @ rays.offset[:2] + pixels.offset
 
 
 def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
-    """The light field with views in between, without samples; how they are made; and why, in words.
+    """The light field with views in between, without samples; how they are synthesized; and why, as text.
 
-    None where views are as dense as the sensor can tell apart.
+    None instead of the method if views are as dense as the sensor can resolve.
 
     Args:
-        train: whose sensor is asked; what bends rays otherwise than affinely is passed over.
-        grid: whose disparities are found now if they are not known.
+        train: with the sensor; non-affine bending of rays is ignored.
+        grid: its disparities are estimated now if unknown.
 
     Raises:
-        InputError: a frame that turns view axes against those of pixels, or disparities that cannot be found.
+        InputError: a frame whose view axes are rotated against the pixel axes, or disparities that cannot be
+            found.
     """
     rows, columns = grid.extent
     if rows <= 1 and columns <= 1:
@@ -136,7 +137,7 @@ def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
     motion[:, 0, 0], motion[:, 1, 1] = disparities, parallax.down(disparities)
     apart = np.linalg.norm(per_index[:, :2] - per_index[:, 2:] @ motion, axis=1)  # (n, axis of the views)
     across, down = apart.max(axis=0)
-    # A pixel, or where that is wider a sample: closer together, no ghosts are seen. With 1.5 pixels, pictures of
+    # A pixel, or a sample if it is wider: no ghosts are visible at smaller distances. With 1.5 pixels, images of
     # benchmarks/sparse_views.py are as good, but borders of smooth planes have 48 dB instead of 56.
     told_apart = max(1.0, float(np.linalg.norm(per_index[:, 2:], axis=0).max()))
     wanted = [

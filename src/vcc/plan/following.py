@@ -1,10 +1,10 @@
-"""Plans whose numbers follow a camera that changes: what is chosen once, and when the choice no longer holds.
+"""Plans whose parameters follow a changing camera: what is chosen once, and when a choice no longer holds.
 
-A plan is choices (how many taps, how fine a texture, which filter) and numbers. Each module chooses by functions
-``choose_…``, which give a frozen record, and computes numbers from such records. A picture that is taken once
-chooses stage by stage (`vcc.plan.choice.compile_best`). While a camera learns, its plan is recomputed for each
-value of its parameters from one record of all choices (`vcc.plan.choice.decide`, `vcc.plan.choice.compute`): its
-numbers then follow the parameters smoothly.
+A plan consists of choices (number of taps, fineness of textures, filters) and parameters. Functions named
+``choose_…`` choose and return a frozen record; other functions compute parameters from such records. For a single
+image, each stage chooses on its own (`vcc.plan.choice.compile_best`). While a camera learns, its plan is
+recomputed for each value of its parameters from one record of all choices (`vcc.plan.choice.decide`,
+`vcc.plan.choice.compute`): the plan's parameters then follow the camera's smoothly.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ Record = TypeVar("Record")
 
 @dataclass(frozen=True)
 class Follow:
-    """That a plan's numbers are to follow a camera: textures in double precision, and room to move.
+    """Request that a plan's parameters follow a camera: textures in double precision, with room to move.
 
     Args:
-        leaving: labels of elements that may leave the plane of the views. What stands there is otherwise taken for
-            one weight a view, and must stay.
+        leaving: labels of elements that may leave the plane of the views. Other elements there become one weight a
+            view, and must stay.
     """
 
     leaving: frozenset[str] = frozenset()
@@ -36,12 +36,12 @@ class Follow:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Numbers of a plan that are linear in what a thing holds, and the transpose of that.
+    """Parameters of a plan that are linear in a field of an object, and the transpose of this map.
 
     Args:
-        follows: whether they follow what a thing (cells of a mask, a surface, an element) holds in a field.
+        follows: whether they follow the given field of an object (cells of a mask, a surface, an element).
         numbers: their names in a plan (`vcc.plan.model.Plan.parameters`).
-        back: from the thing and weights of the numbers, in that order, to weights of what the field holds.
+        back: from the object and weights of the parameters, in that order, to weights of the field's values.
     """
 
     follows: Callable[[Any, str], bool]
@@ -53,10 +53,10 @@ class Linear:
 
 
 def plan_again(what: str) -> InputError:
-    """The refusal to follow a camera where what was chosen for its plan no longer holds.
+    """The error to raise if a choice of the plan no longer holds, so that it cannot follow the camera.
 
     Args:
-        what: is no longer what it was, in words.
+        what: has changed, as text.
     """
     return InputError(
         f"{what}: not what it was when the plan was made, so that the plan's numbers cannot follow. Plan again "
@@ -65,10 +65,10 @@ def plan_again(what: str) -> InputError:
 
 
 def check_unchanged(what: str, chosen: Any, now: Any) -> None:
-    """Check that something is still what it was when choices were made.
+    """Check that something is unchanged since the choices were made.
 
     Raises:
-        InputError: it is not.
+        InputError: it has changed.
     """
     if content(chosen) != content(now):
         raise plan_again(what)
@@ -78,18 +78,18 @@ def check_unchanged(what: str, chosen: Any, now: Any) -> None:
 
 
 def give(stages: object, choices: Any) -> None:
-    """Give an object of stages what was chosen before: its property ``choose_x`` is then the record's field ``x``.
+    """Set earlier choices on an object of stages: its property ``choose_x`` becomes the record's field ``x``.
 
     Args:
-        stages: whose properties ``choose_…`` are cached.
-        choices: a record; None: stages choose when they are asked.
+        stages: an object whose properties ``choose_…`` are cached.
+        choices: a record; None: stages choose when they are read.
     """
     if choices is not None:
         preset(stages, **{f"choose_{each.name}": getattr(choices, each.name) for each in fields(choices)})
 
 
 def gathered(kind: type[Record], stages: object) -> Record:
-    """The record of all that an object of stages chooses, or was given."""
+    """The record of all choices of an object of stages, made or set."""
     return kind(**{each.name: getattr(stages, f"choose_{each.name}") for each in fields(kind)})  # type: ignore[arg-type]
 
 
@@ -100,19 +100,19 @@ def choice(words: str, alike: Callable[[Any, Any], bool] | None = None) -> Any:
     """A field of a record of choices.
 
     Args:
-        words: what is chosen, as `differences` says it.
-        alike: whether two values of it come to the same; None: where their content is equal.
+        words: what is chosen, as text for `differences`.
+        alike: whether two values are equivalent; None: if their content is equal.
     """
     return field(metadata={"words": words, "alike": alike})
 
 
 def differences(one: Any, other: Any, about: str = "") -> tuple[str, ...]:
-    """What two records choose otherwise, in words, in the order of their fields.
+    """The choices in which two records differ, as text, in the order of their fields.
 
     Args:
-        one: a record whose fields are made by `choice`; others are not compared.
+        one: a record whose fields are made by `choice`; other fields are not compared.
         other: of the same kind.
-        about: what both are about.
+        about: prefix of each text.
     """
     found: list[str] = []
     for each in fields(one):
@@ -135,14 +135,14 @@ def _differences(each: Field[Any], mine: Any, others: Any, about: str) -> tuple[
     return () if content(mine) == content(others) else (words,)
 
 
-# --- what is costly
+# --- costly results
 
 
 class Parts:
-    """The costly parts of plans: made once for what they depend on, where plans of cameras nearby are made.
+    """Costly parts of plans, cached by all that they depend on and reused by plans of nearby cameras.
 
     Args:
-        check: called before each; what it raises ends the planning.
+        check: called before each part; an exception that it raises ends the planning.
     """
 
     def __init__(self, check: Callable[[], None] | None = None) -> None:
@@ -151,16 +151,16 @@ class Parts:
         self._used: dict[Hashable, Any] | None = None
 
     def check(self) -> None:
-        """End the planning where the plan is no longer wanted."""
+        """End the planning if the plan is no longer wanted."""
         if self._check is not None:
             self._check()
 
     def part(self, what: str, depends_on: Callable[[], Hashable], make: Callable[[], Made]) -> Made:
-        """A part that was kept, or is made now.
+        """Return a cached part, or make it now.
 
         Args:
             what: kind of part.
-            depends_on: gives all that it depends on.
+            depends_on: returns all that it depends on.
             make: makes it.
         """
         self.check()
@@ -174,7 +174,7 @@ class Parts:
 
     @contextmanager
     def keeping(self) -> Iterator[None]:
-        """Keep the parts of the plan that is made within, and those only."""
+        """Keep the parts of the plan that is made within the context, and only these."""
         self._used = {}
         try:
             yield
@@ -183,4 +183,4 @@ class Parts:
 
 
 NONE_KEPT = Parts()
-"""Of plans that no other plan follows."""
+"""For plans that no other plan follows."""

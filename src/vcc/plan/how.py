@@ -1,4 +1,4 @@
-"""How a picture is made: all that a user may choose about a computation, in one record."""
+"""How an image is made: all options of a computation, in one record."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ EngineName = Literal["reference", "array_api", "numba", "cuda"]
 
 LARGEST_REFINEMENT = 8
 LARGEST_SAMPLES = 2**16
-"""Rays a pixel: as many points as the table that all pixels share has."""
+"""Largest number of rays a pixel: the number of points in the table that all pixels share."""
 
 
 OF_THE_RUN = ("tolerance", "engine", "threads", "memory_limit")
-"""What is chosen anew for each run of a plan; all else decides how the plan is made."""
+"""Options of a run, not of the plan; all other options affect how the plan is made."""
 
 
 class Options(TypedDict, total=False):
-    """The fields of `How`, for those who pass them one by one: ``camera.capture(lf, method="rays")``."""
+    """The fields of `How`, to pass them as keywords: ``camera.capture(lf, method="rays")``."""
 
     method: Method
     interpolation: Interpolation
@@ -46,41 +46,42 @@ class Options(TypedDict, total=False):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class How(Value, Shown):
-    """All that may be chosen about how a picture is made.
+    """All options for how an image is made.
 
     Args:
-        method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, where the optics
-            fold into one matrix; ``"rays"`` traces rays back from the sensor through anything; ``"auto"`` takes
-            footprints where they can be had.
-        interpolation: within a view: ``"sharp"``, linear with what that takes from sharpness given back (rings by
-            some per cent beside hard edges, and may go below 0 there), or ``"linear"``; by footprints also
+        method: ``"footprints"`` spreads each sample of the light field over the sensor, exactly, if the optics
+            fold into one matrix; ``"rays"`` traces rays back from the sensor through any optics; ``"auto"`` uses
+            footprints if possible.
+        interpolation: within a view: ``"sharp"``, linear with the loss of sharpness compensated (rings by a few
+            per cent beside hard edges, and may go below 0 there), or ``"linear"``; for footprints also
             ``"nearest"`` (the paper's, for comparison) or ``"cubic"`` (Catmull-Rom).
-        between_views: ``"auto"`` interpolates between views along the scene's parallax (footprints: only where
-            neighbouring views differ by more than about a pixel on the sensor); ``"depth"`` (footprints) makes as
-            many views in between as the sensor can tell apart, up to 16×16 for each one, from the light field's
-            ``disparity``, which is found first where it is not given: no ghosts at any depth, at the cost that
-            `vcc.Camera.explain` states, for NumPy arrays; ``"none"`` never does.
-        scene_distance: the distance in metres of the scene before the entrance plane, by which that
-            interpolation goes; None takes the range of distances that the light field states or shows.
-        refine: footprints: ``"auto"`` divides cells and samples where a mask is finer than they are, at a cost
-            that `vcc.Camera.explain` states; a number from 2 to 8 divides the same, samples up to so many parts
-            each way and cells of views up to as many, but at least as far as "auto" does; 1 divides nothing, and
-            nothing is then said of what that costs.
+        between_views: ``"auto"`` interpolates between views along the scene's parallax (footprints: only if
+            neighbouring views differ by more than about a pixel on the sensor); ``"depth"`` (footprints)
+            synthesizes as many views in between as the sensor can resolve, up to 16×16 for each one, from the
+            light field's ``disparity``, which is estimated first if not given: no ghosts at any depth, at the
+            cost that `vcc.Camera.explain` reports, for NumPy arrays; ``"none"`` never interpolates.
+        scene_distance: the distance in metres of the scene before the entrance plane, used for the interpolation
+            between views; None uses the range of distances given with or measured in the light field.
+        refine: footprints: ``"auto"`` divides cells and samples if a mask is finer than they are, at a cost
+            that `vcc.Camera.explain` reports; a number from 2 to 8 sets the largest number of parts each way of
+            samples and of cells of views, but divides at least as far as "auto"; 1 divides nothing, and the error
+            is then not reported.
         samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet that
-            the pixel sees); None takes 64, whose error is warned of where it exceeds 1 % of the brightest pixel.
-        tolerance: double the samples until the estimated sampling error of the picture, root mean square, is at
+            the pixel sees); None uses 64, with a warning if the error exceeds 1 % of the brightest pixel.
+        tolerance: double the samples until the estimated sampling error of the image, root mean square, is at
             most this share of its mean; None does not.
-        seed: of the rays' choice of points. The same seed gives the same picture, on any number of threads.
+        seed: of the points of the rays. The same seed gives the same image, on any number of threads.
         engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and other arrays:
             carries gradients), ``"cuda"`` (on an NVIDIA GPU; extra ``gpu``; default for samples that
             `vcc.LightField.on_gpu` keeps there) or ``"reference"`` (slow; defines what is correct).
-        threads: how many work at once; None takes as many as this process may use cores. The picture is the same.
-        memory_limit: of a light field on disk, bytes that its pieces, the picture and the engine may take
-            together; None takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time
-            by rays, all of which are traced for each piece.
+        threads: number of concurrent threads; None uses as many as there are cores for this process. The image
+            does not depend on it.
+        memory_limit: for a stored light field, bytes for its pieces, the image and the engine together; None
+            uses a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time with rays,
+            because all rays are traced for each piece.
 
     Raises:
-        InputError: a value that does not exist (named, with those that do).
+        InputError: an unsupported value, named together with the supported ones.
     """
 
     method: Method = "auto"
@@ -124,14 +125,14 @@ class How(Value, Shown):
 
     @classmethod
     def of(cls, how: How | None, options: Any) -> How:
-        """A record, and what is to be changed in it.
+        """A record with some options changed.
 
         Args:
-            how: None takes the defaults.
+            how: None uses the defaults.
             options: names and values.
 
         Raises:
-            InputError: a name that does not exist, or a value that does not.
+            InputError: an unknown name, or an unsupported value.
         """
         if how is not None and not isinstance(how, How):
             raise InputError(f"how is a vcc.How, such as vcc.How(method='rays'), not {type(how).__name__}")
@@ -145,17 +146,17 @@ class How(Value, Shown):
 
     @property
     def rays_a_pixel(self) -> int | None:
-        """``samples`` as they are taken: rounded up to a power of two."""
+        """``samples`` rounded up to a power of two."""
         return None if self.samples is None else int(2 ** math.ceil(math.log2(self.samples)))
 
     @property
     def workers(self) -> int:
-        """``threads``, or as many as this process may use cores."""
+        """``threads``, or the number of cores that this process may use."""
         return self.threads or cores()
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """The number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -1,8 +1,8 @@
-"""Where on the sensor views show the scene better as they are than with views made in between.
+"""Regions of the sensor in which the original views show the scene better than views synthesized in between.
 
-What is in focus lands on the same pixels from every view. The samples of many views then lie between one another,
-and show detail finer than any one view has; pictures made in between are interpolated from one view each, and lack
-it. Where views' pictures lie more than a pixel or two apart, samples as they are show ghosts.
+Objects in focus land on the same pixels from every view. The samples of many views then interleave and show detail
+finer than any one view has. Synthesized images are interpolated from one view each and lack this detail. If views'
+images are more than a pixel or two apart, the original samples show ghosts.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from vcc.plan.depth_rule import ViewsBetween, on_sensor
 Array = NDArray[np.float64]
 
 IN_FOCUS, OUT_OF_FOCUS = 1.0, 2.0
-"""Pixels on the sensor, or samples where those are wider, between neighbouring views' pictures: up to the one,
-views count as they are; from the other on, views made in between."""
+"""Distance between neighbouring views' images, in pixels on the sensor, or samples if these are wider: up to the
+first, the original views are used; from the second on, the synthesized views."""
 _LEVELS = 1.4
-"""From one class of blur to the next: what veils is as blurred as the most blurred of its class."""
+"""Ratio between classes of blur: foreground blur is taken as large as the largest blur of its class."""
 
 
 def share_in_focus(
     train: Train, grid: Grid, between: ViewsBetween, used: NDArray[np.bool_]
 ) -> NDArray[np.float32] | None:
-    """Which share of each pixel of the sensor views as they are show better, (rows, columns); None where none.
+    """Share of each pixel of the sensor taken from the original views, (rows, columns); None if zero everywhere.
 
-    The map of disparities nearest to the middle of the views says where the scene is in focus. A nearer thing out
-    of focus veils what is behind it as far as its blur reaches.
+    The map of disparities nearest to the middle of the views determines where the scene is in focus. A nearer
+    object out of focus covers the background as far as its blur reaches.
 
     Args:
-        train: what bends rays otherwise than affinely is passed over.
-        grid: of the light field that there is.
-        between: its maps.
-        used: which views are looked at, (v, u).
+        train: non-affine bending of rays is ignored.
+        grid: of the original light field.
+        between: its disparity maps.
+        used: which views are used, (v, u).
     """
     from scipy.ndimage import distance_transform_edt, grey_dilation, map_coordinates
 
@@ -59,7 +59,7 @@ def share_in_focus(
     def share(gaps: Array | float) -> Array:
         return np.clip((OUT_OF_FOCUS - np.asarray(gaps)) / (OUT_OF_FOCUS - IN_FOCUS), 0, 1)
 
-    # Borders of maps are uncertain by a pixel, and beside what is in focus ghosts are not seen as easily.
+    # Borders of maps are uncertain by a pixel, and next to objects in focus ghosts are less visible.
     found = grey_dilation(share(gap), footprint=np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]]), mode="nearest")
     radius = float(np.hypot(*(np.argwhere(used) - maps.views[number]).T).max())
     level = IN_FOCUS

@@ -1,8 +1,8 @@
-"""The plan: what is left of a camera seen from a light field, as pure numbers for an engine.
+"""The plan: a camera seen from a light field, reduced to pure numbers for an engine.
 
-    picture = after ∘ core ∘ before (samples)
+    image = after ∘ core ∘ before (samples)
 
-Every step is linear in the samples, so the picture is the sum of the pictures of parts of them.
+Every step is linear in the samples, so the image is the sum of the images of parts of the samples.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from vcc.plan.parameters import parameters, with_parameters
 from vcc.plan.protocol import Core
 
 NUMBERED = ("core", "before", "after")
-"""What of a plan holds the numbers that make its picture."""
+"""Fields of a plan that hold the parameters of its image."""
 
 
 @dataclass(frozen=True, eq=False)
 class MadeFor:
-    """What a plan was made for.
+    """The camera and the light field that a plan was made for.
 
     Args:
         train: the optics.
@@ -45,11 +45,11 @@ class MadeFor:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InFocus(Value, Brief):
-    """What is in focus where views are made in between: it is shown better by the views as they are.
+    """Correction for objects in focus if views are interpolated: the original views show them better.
 
     Args:
-        plan: of the picture that these make.
-        share: of each pixel of the sensor that is taken from it, (rows, columns), 0 to 1.
+        plan: of the image from the original views.
+        share: share of each pixel of the sensor that is taken from this image, (rows, columns), 0 to 1.
     """
 
     plan: Plan
@@ -58,26 +58,26 @@ class InFocus(Value, Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(Value, Shown):
-    """How to make the picture of a light field.
+    """Instructions for making the image of a light field.
 
     Plans of equal content are equal, and can be keys of a cache.
 
     Args:
-        sensor_shape: (rows, columns) of the picture.
+        sensor_shape: (rows, columns) of the image.
         grid_shape: (v, u, t, s) of the light field's samples.
-        core: what turns samples into a raster: `vcc.plan.footprints.model.Footprints` or
+        core: turns samples into a raster: `vcc.plan.footprints.model.Footprints` or
             `vcc.plan.rays.model.Rays`.
-        before: what is done to samples before that, in order.
-        after: what is done to the raster, in order.
-        views_between: how views in between are made before all else, or None; the rest counts what is there then.
-        in_focus: what is taken from the views as they are where views are made in between, or None.
-        missing_rays: share of the rays asked for that the light field lacks.
-        missing_reason: in words.
-        expected_ghosting: largest gap in pixels between neighbouring views' pictures of the same thing that is
-            left unfilled.
-        cautions: what a user should be warned of before a run, in words.
-        notes: what was decided and why, in words.
-        made_for: the camera and the light field's place, by which `check_fits` tells; not part of what it is.
+        before: operators on samples before the core, in order.
+        after: operators on the raster, in order.
+        views_between: how views in between are synthesized first, or None; the rest of the plan applies to the
+            result.
+        in_focus: what is taken from the original views if views in between are synthesized, or None.
+        missing_rays: share of the requested rays that the light field lacks.
+        missing_reason: as text.
+        expected_ghosting: largest remaining gap in pixels between neighbouring views' images of the same object.
+        cautions: warnings to show to the user before a run, as text.
+        notes: decisions and reasons, as text.
+        made_for: camera and frame of the light field, for `check_fits`; ignored by comparisons.
     """
 
     sensor_shape: tuple[int, int]
@@ -96,12 +96,12 @@ class Plan(Value, Shown):
 
     @property
     def by_rays(self) -> bool:
-        """Whether rays are traced, rather than footprints summed."""
+        """Whether rays are traced, instead of footprints summed."""
         return self.core.method == "rays"
 
     @property
     def samples_touched(self) -> int:
-        """How many samples an engine goes through, refined ones and those looked at twice counted."""
+        """Number of samples that an engine processes, refined samples and repeated reads included."""
         return self.core.samples_touched
 
     @property
@@ -111,7 +111,7 @@ class Plan(Value, Shown):
 
     @property
     def halo(self) -> tuple[tuple[int, int], ...]:
-        """Dark samples that are put (before, after) those of a piece along (v, u, t, s)."""
+        """Dark samples that are added (before, after) the samples of a piece along (v, u, t, s)."""
         return next((o.halo for o in self.before if isinstance(o, DarkBorder)), ((0, 0),) * 4)
 
     @property
@@ -120,30 +120,30 @@ class Plan(Value, Shown):
         return next((o.half_widths for o in self.after if isinstance(o, AlongAxes)), (0.0, 0.0))
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """The shape of the samples that the core takes of those of a shape (v, u, t, s[, channels])."""
+        """The shape of the samples that the core reads, for given samples of a shape (v, u, t, s[, channels])."""
         for operator in self.before:
             shape = operator.shape(shape)
         return shape
 
     def block(self, block: Block) -> Block:
-        """Which of the samples that the core takes come from a block of those that there are."""
+        """The block of the core's samples that a block of the given samples affects."""
         for operator in self.before:
             block = operator.block(block)
         return block
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Which views of a light field of samples of a shape are looked at, (v, u); all where none is."""
+        """The views of a light field with samples of this shape that are used, (v, u); all if none is used."""
         used = self._of_views(self.core.used_views(self.shape(shape)))
         return used if used.any() else np.ones(shape[:2], dtype=bool)
 
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """Which pixels of each view of a light field may be looked at.
+        """The pixels of each view of a light field that may be used.
 
         Args:
             shape: of its samples, (v, u, t, s[, channels]).
 
         Returns:
-            The first, and the one after the last, of rows and of columns: (v, u, 2, 2).
+            First and stop of rows and of columns: (v, u, 2, 2).
         """
         found = self._of_views(self.core.used_pixels(self.shape(shape)))
         for operator in reversed(self.before):
@@ -151,20 +151,20 @@ class Plan(Value, Shown):
         return np.asarray(np.clip(found, 0, np.array(shape[2:4])[:, None]))
 
     def _of_views(self, found: Any) -> Any:
-        """What is found of views, (v, u, …), without the dark ones that are put beside them."""
+        """Values for views, (v, u, …), without the dark views that are added around them."""
         (top, bottom), (left, right), *_ = self.halo
         return found[top : found.shape[0] - bottom, left : found.shape[1] - right]
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """The type that samples of a NumPy type have in memory, and what a number of theirs stands for."""
+        """The type in memory of samples of a NumPy type, and the factor that converts its numbers to samples."""
         factor = 1.0
         for operator in self.before:
             kind, one = operator.kept_as(kind)
             factor *= one
-        return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # compiled code takes no half
+        return (np.dtype(np.float32) if kind == np.float16 else kind), factor  # no float16 in compiled code
 
     def parameters(self) -> dict[str, NDArray[np.float64]]:
-        """The numbers of the core and of what is done before and after it: ``"core.x"``, ``"after[0].down"``."""
+        """The parameters of the core and of the operators around it: ``"core.x"``, ``"after[0].down"``."""
         return {
             name + rest if rest.startswith("[") else f"{name}.{rest}": value
             for name in NUMBERED
@@ -172,7 +172,7 @@ class Plan(Value, Shown):
         }
 
     def with_parameters(self, changed: Mapping[str, Any]) -> Plan:
-        """The same plan with some parameters changed, by the names of `parameters`."""
+        """The same plan with the given parameters changed, by the names of `parameters`."""
         parts: dict[str, dict[str, Any]] = {name: {} for name in NUMBERED}
         for full, value in changed.items():
             name = next(name for name in NUMBERED if full.startswith((f"{name}.", f"{name}[")))
@@ -182,7 +182,7 @@ class Plan(Value, Shown):
         )
 
     def check_fits(self, train: Train, grid: Grid) -> None:
-        """Refuse a plan that was made for something else.
+        """Raise an error if the plan was made for something else.
 
         Raises:
             InputError: another camera, or another shape or frame of light field.

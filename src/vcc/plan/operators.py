@@ -1,9 +1,9 @@
-"""What is done before and after a plan's core: small linear operators, each with its transpose beside it.
+"""Linear operators before and after a plan's core, each with its transpose.
 
-Operators before the core act on samples (v, u, t, s[, channels]) of some views, those after it on the raster
+Operators before the core act on samples (v, u, t, s[, channels]) of some views, operators after it on the raster
 (rows, columns, channels). All are linear, and ``transpose`` is the adjoint of ``apply``:
-⟨apply(a), b⟩ = ⟨a, transpose(b)⟩. They take arrays of NumPy and of other array libraries. ``pull`` is the
-derivative of ⟨apply(a), b⟩ to the operator's own numbers.
+⟨apply(a), b⟩ = ⟨a, transpose(b)⟩. They accept arrays of NumPy and of other array libraries. ``pull`` is the
+derivative of ⟨apply(a), b⟩ to the operator's own parameters.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ from vcc.plan.sharpening import MEAN, TENT, along_axis
 Array = NDArray[np.float64]
 
 LONG = 64
-"""Weights from which on a filter is quicker through Fourier transforms."""
+"""Number of weights above which a filter is faster by Fourier transforms."""
 ROUNDING = 1e-13
-"""Of the largest number: below it lies what Fourier transforms in double precision round to."""
+"""Share of the largest number: smaller results of Fourier transforms in double precision are rounding errors."""
 RANK_TOLERANCE = 1e-8
 SOFTENED: dict[Sample, int] = {"point": TENT, "mean": TENT + MEAN}
-"""How many times the averaging over a sample, sinc(f), stands in what is looked up: twice by interpolation, once
-more in samples that are means over their pixels."""
+"""Number of times that the averaging over a sample, sinc(f), acts on looked-up values: twice by interpolation,
+once more if samples are means over their pixels."""
 
 
 class Before(Protocol):
-    """What is done to samples before they are cast on the sensor or looked up."""
+    """An operator on samples before the core."""
 
     reach: int
     """Rows of pixels on each side of a block that are read with it."""
     copies: bool
-    """Whether new samples are made, which take memory: then a column of views is taken at a time, if it can be."""
+    """Whether new samples are made, which take memory: columns of views are then processed one by one."""
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) as the core takes them."""
+        """Samples (v, u, t, s[, channels]) for the next operator, or the core."""
         ...
 
     def transpose(self, values: Any) -> Any:
@@ -53,15 +53,15 @@ class Before(Protocol):
         ...
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """The derivative of ⟨weights, apply(values)⟩ to the operator's own numbers that are wanted, by name."""
+        """The derivative of ⟨weights, apply(values)⟩ to the operator's parameters that are wanted, by name."""
         ...
 
     def block(self, block: Block) -> Block:
-        """Which of the samples that the core takes come from a block of those that there are."""
+        """The block of the result's samples that a block of the given samples affects."""
         ...
 
     def made_of(self, pixels: Any) -> Any:
-        """Of which pixels those are made that the core takes: what goes beyond a view is cut off by who asks.
+        """The pixels from which given pixels of the result are made; the caller clips those beyond a view.
 
         Args:
             pixels: first and stop of rows and of columns of pixels, (…, 2, 2).
@@ -69,19 +69,19 @@ class Before(Protocol):
         ...
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """The shape that samples of a shape get."""
+        """The shape of the result for samples of a shape."""
         ...
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """The type that samples of a NumPy type get, and what one of its numbers stands for in those given."""
+        """The type of the result for samples of a NumPy type, and the factor from its numbers to theirs."""
         ...
 
 
 class After(Protocol):
-    """What is done to the raster (rows, columns, channels) after the core."""
+    """An operator on the raster (rows, columns, channels) after the core."""
 
     def apply(self, raster: Any) -> Any:
-        """The raster as the next operator, or the picture, takes it."""
+        """The raster for the next operator, or the image."""
         ...
 
     def transpose(self, raster: Any) -> Any:
@@ -89,7 +89,7 @@ class After(Protocol):
         ...
 
     def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """The derivative of ⟨weights, apply(raster)⟩ to the operator's own numbers that are wanted, by name."""
+        """The derivative of ⟨weights, apply(raster)⟩ to the operator's parameters that are wanted, by name."""
         ...
 
 
@@ -98,13 +98,13 @@ class After(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SwapPixelAxes(Value):
-    """Rows and columns of pixels change places: a frame that turns views leads rows to columns of the sensor."""
+    """Swap rows and columns of pixels, for a frame that maps rows of views to columns of the sensor."""
 
     reach = 0
     copies = False
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) as (v, u, s, t[, channels]), not copied where the library allows it."""
+        """Samples (v, u, t, s[, channels]) as (v, u, s, t[, channels]), not copied if the library allows it."""
         if isinstance(values, np.ndarray):
             return values.swapaxes(2, 3)
         return array_namespace(values).permute_dims(values, (0, 1, 3, 2, *range(4, values.ndim)))
@@ -112,29 +112,29 @@ class SwapPixelAxes(Value):
     transpose = apply
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """There are no numbers."""
+        """There are no parameters."""
         return {}
 
     def block(self, block: Block) -> Block:
-        """The same samples, their axes in the other order."""
+        """The same samples, with swapped axes."""
         return replace(block, pixel_rows=block.pixel_columns, pixel_columns=block.pixel_rows)
 
     def made_of(self, pixels: Any) -> Any:
-        """The same, in the other order."""
+        """The same pixels, with swapped axes."""
         return pixels[..., ::-1, :]
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """With rows and columns of pixels in the other order."""
+        """With rows and columns of pixels swapped."""
         return (*shape[:2], shape[3], shape[2], *shape[4:])
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """As they were."""
+        """Unchanged."""
         return kind, 1.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BlurViews(Brief, Value):
-    """Each view convolved with a kernel, a diffuser at the views; it grows by half the kernel on each side.
+    """Each view convolved with a kernel, for a diffuser at the views; it grows by half the kernel on each side.
 
     Args:
         kernel: in samples, odd rows × odd columns of sum 1.
@@ -146,7 +146,7 @@ class BlurViews(Brief, Value):
     copies = True
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) convolved, in float32; float64 stays."""
+        """Samples (v, u, t, s[, channels]) convolved, in float32; float64 is kept."""
         if not isinstance(values, np.ndarray):
             return self._in_library(values)
         from scipy.signal import oaconvolve
@@ -154,12 +154,13 @@ class BlurViews(Brief, Value):
         result = np.empty(self.shape(values.shape), dtype=self.kept_as(values.dtype)[0])
         weights = self.kernel if values.ndim == 4 else self.kernel[:, :, None]
         for view in np.ndindex(values.shape[:2]):
-            # In double precision: what Fourier transforms round to in the dark would else add up.
+            # In double precision: otherwise rounding errors of the Fourier transforms would add up in dark
+            # regions.
             result[view] = without_rounding(oaconvolve(values[view].astype(np.float64), weights, axes=(0, 1)))
         return result
 
     def transpose(self, values: Any) -> Any:
-        """Samples of the grown views correlated with the kernel, cut to what the views were: float64 of NumPy."""
+        """Samples of the grown views correlated with the kernel, cropped to the views: float64 of NumPy."""
         from scipy.signal import oaconvolve
 
         turned = self.kernel[::-1, ::-1]
@@ -173,13 +174,13 @@ class BlurViews(Brief, Value):
         return np.reshape(np.stack(views), (nv, nu, nt - high, ns - wide, *values.shape[4:]))
 
     def block(self, block: Block) -> Block:
-        """What a block's light reaches: as many more rows and columns as the kernel has beside its middle."""
+        """The block grown by the kernel's size less one."""
         (first, stop), (left, right) = block.pixel_rows, block.pixel_columns
         high, wide = (n - 1 for n in self.kernel.shape)
         return replace(block, pixel_rows=(first, stop + high), pixel_columns=(left, right + wide))
 
     def made_of(self, pixels: Any) -> Any:
-        """Those under the kernel, which stands before them in the grown view."""
+        """The pixels under the kernel, which extends before them in the grown view."""
         return pixels - np.stack([np.array(self.kernel.shape) - 1, [0, 0]], axis=-1)
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -188,7 +189,7 @@ class BlurViews(Brief, Value):
         return (*shape[:2], shape[2] + rows - 1, shape[3] + columns - 1, *shape[4:])
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """The derivative to the kernel: how samples (v, u, t, s[, channels]) agree with weights of grown views."""
+        """The derivative to the kernel: the correlation of samples with weights of the grown views."""
         if "kernel" not in wanted:
             return {}
         rows, columns = self.kernel.shape
@@ -199,7 +200,7 @@ class BlurViews(Brief, Value):
         return {"kernel": total}
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """In single precision; double where it was."""
+        """Single precision; float64 is kept."""
         return (kind if kind == np.float64 else np.dtype(np.float32)), 1.0
 
     def _in_library(self, values: Any) -> Any:
@@ -220,13 +221,13 @@ class BlurViews(Brief, Value):
 
 @dataclass(frozen=True, eq=False)
 class DarkBorder(Value):
-    """Dark samples around a piece of a light field, where the light field has others that are not in the piece.
+    """Dark samples around a piece of a light field where the light field has samples that are not in the piece.
 
-    What is done afterwards spreads the piece's light among them as it does in the whole, so that the pictures of
-    the pieces add up to the picture of the whole.
+    Later operators spread the piece's light into the border as they do in the whole, so that the images of
+    the pieces add up to the image of the whole.
 
     Args:
-        halo: (before, after) along (v, u, t, s): how many samples.
+        halo: number of samples (before, after) along (v, u, t, s).
     """
 
     halo: tuple[tuple[int, int], ...]
@@ -235,7 +236,7 @@ class DarkBorder(Value):
     copies = True
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) with the border, of their type."""
+        """Samples (v, u, t, s[, channels]) with the border, of the same type."""
         if isinstance(values, np.ndarray):
             return np.pad(values, [*self.halo, *[(0, 0)] * (values.ndim - 4)])
         xp = array_namespace(values)
@@ -251,21 +252,21 @@ class DarkBorder(Value):
         return values
 
     def transpose(self, values: Any) -> Any:
-        """Samples with the border cut off."""
+        """Samples without the border."""
         cut = (slice(a, n - b) for (a, b), n in zip(self.halo, values.shape[:4], strict=True))
         return values[(*cut, ...)]
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """There are no numbers."""
+        """There are no parameters."""
         return {}
 
     def block(self, block: Block) -> Block:
-        """What a block's light reaches: itself and as much of a border on each side as the piece has."""
+        """The block grown by the border on each side."""
         grown = ((first, stop + a + b) for (first, stop), (a, b) in zip(block.ranges, self.halo, strict=True))
         return Block(*grown)
 
     def made_of(self, pixels: Any) -> Any:
-        """The same, where they stand without the border."""
+        """The same pixels, counted without the border."""
         return pixels - np.array(self.halo)[2:, :1]
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -274,7 +275,7 @@ class DarkBorder(Value):
         return (*grown, *shape[4:])
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """As they were."""
+        """Unchanged."""
         return kind, 1.0
 
 
@@ -282,15 +283,15 @@ class DarkBorder(Value):
 class SharpenViews(Value):
     """Each view filtered along k and along l, to compensate beforehand for linear look-ups.
 
-    A ray interpolates linearly between the samples of a view. Seen from places all over a sample, that averages
-    the view with a tent, which takes 1 − sinc²(f) of a cosine of f cycles a sample: 3 % at 0.1, 7 % at 0.15. Where
-    a sample is itself a mean over its pixel, light that is averaged over a sensor's pixel is averaged a second
-    time, and loses 1 − sinc(f) more. Beyond a view's border its last samples go on, so that what is even stays
-    even.
+    A ray interpolates linearly between the samples of a view. Averaged over all places within a sample, this
+    filters the view with a tent, which takes 1 − sinc²(f) of a cosine of f cycles a sample: 3 % at 0.1, 7 % at
+    0.15. If a sample is itself a mean over its pixel, light that is averaged over a sensor's pixel is averaged a
+    second time, and loses 1 − sinc(f) more. Beyond a view's border its last samples are repeated, so that
+    uniform views stay uniform.
 
     Args:
-        weights: of a sample, of each of its neighbours and of those beyond, in 2⁻¹⁰ (`WEIGHT_DIGITS`), as
-            `of` gives them.
+        weights: of a sample, of its neighbours and of the samples beyond, in 2⁻¹⁰ (`WEIGHT_DIGITS`), as
+            returned by `of`.
     """
 
     weights: tuple[int, int, int]
@@ -300,10 +301,10 @@ class SharpenViews(Value):
 
     @classmethod
     def of(cls, sample: Sample) -> SharpenViews:
-        """The filter of a picture whose samples are as large as its pixels (`vcc.plan.sharpening`), rounded.
+        """The filter of an image whose samples are as large as its pixels (`vcc.plan.sharpening`), rounded.
 
         Args:
-            sample: "mean" or "point": what samples are by themselves.
+            sample: "mean" or "point".
         """
         outer, inner = (
             round(float(weight) * 2**WEIGHT_DIGITS) for weight in along_axis(SOFTENED[sample], 1.0)[:2]
@@ -311,7 +312,7 @@ class SharpenViews(Value):
         return cls((2**WEIGHT_DIGITS - 2 * inner - 2 * outer, inner, outer))
 
     def apply(self, values: Any) -> Any:
-        """Samples (v, u, t, s[, channels]) sharpened: 8 bits as whole numbers of 16 bits, exactly; else floats."""
+        """Samples (v, u, t, s[, channels]) sharpened: 8 bits as 16-bit integers, exactly; else floats."""
         xp = array_namespace(values)
         kind = to_dtype(values)
         if kind == np.uint8:
@@ -323,7 +324,7 @@ class SharpenViews(Value):
         return self._filtered(xp, xp.astype(values, working), [n * 2.0**-WEIGHT_DIGITS for n in self.weights])
 
     def transpose(self, values: Any) -> Any:
-        """What each sample adds to a weighted sum of sharpened ones: float64 of NumPy, rounding left out."""
+        """The transpose of the filter: float64 of NumPy, without rounding."""
         values = np.asarray(values, dtype=np.float64)
         for axis in (2, 3):
             matrix = np.zeros((values.shape[axis],) * 2)
@@ -334,23 +335,23 @@ class SharpenViews(Value):
         return values
 
     def pull(self, values: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """Weights are whole numbers, which are decided and not learned."""
+        """Weights are integers, which are chosen and not learned."""
         return {}
 
     def block(self, block: Block) -> Block:
-        """The same samples: those read beside them are cut off again."""
+        """The same samples: the neighbours that are read with them are cut off again."""
         return block
 
     def made_of(self, pixels: Any) -> Any:
-        """With those that the filter looks at beside them."""
+        """With the neighbours that the filter reads."""
         return pixels + np.array([-self.reach, self.reach])
 
     def shape(self, shape: tuple[int, ...]) -> tuple[int, ...]:
-        """As it was."""
+        """Unchanged."""
         return shape
 
     def kept_as(self, kind: np.dtype[Any]) -> tuple[np.dtype[Any], float]:
-        """8 bits in 16, with digits after the point; else single precision, or double where it was."""
+        """8 bits as fixed-point numbers of 16 bits; else single precision, or float64 if given."""
         if kind == np.uint8:
             return np.dtype(np.int16), 2.0**-KEPT_DIGITS
         return (kind if kind == np.float64 else np.dtype(np.float32)), 1.0
@@ -368,12 +369,12 @@ class SharpenViews(Value):
 
 
 REACH = 2
-"""Samples on each side that a sharpened sample takes in."""
+"""Samples on each side that affect a sharpened sample."""
 WEIGHT_DIGITS = 10
-"""Weights are whole numbers of 2⁻¹⁰: what is even stays so to the bit, and 8-bit samples are filtered exactly."""
+"""Weights are integers in units of 2⁻¹⁰: uniform views stay uniform to the bit, and 8-bit samples are exact."""
 KEPT_DIGITS = 5
-"""Binary digits after the point with which 8-bit samples are kept in 16 bits: 2⁻⁵ of a level, sixteen times finer
-than they were rounded, with room for values 4 times the range (the filter's are at most 3.4 times)."""
+"""Binary digits after the point of 8-bit samples in 16 bits: 2⁻⁵ of a level, sixteen times finer than their
+rounding, with room for values 4 times the range (the filter's are at most 3.4 times)."""
 
 
 # --- after ---
@@ -386,8 +387,8 @@ class AlongAxes(Brief, Value):
     Args:
         down: an odd number of weights along columns.
         across: likewise along rows.
-        words: what it is for.
-        half_widths: (vertical, horizontal) in pixels, where the weights are those of tents; see `tents`.
+        words: purpose.
+        half_widths: (vertical, horizontal) in pixels, if the weights are tents; see `tents`.
     """
 
     down: Array
@@ -399,12 +400,12 @@ class AlongAxes(Brief, Value):
     def tents(
         cls, vertical: float, horizontal: float, beside: tuple[int | None, int | None] = (None, None)
     ) -> AlongAxes:
-        """What fills the gaps between the pictures of neighbouring views.
+        """The filter that fills the gaps between neighbouring views' images.
 
         Args:
             vertical: half width of the tent along columns, pixels; 0 for none.
             horizontal: likewise along rows.
-            beside: weights on each side of the middle of both; None: as many as it takes.
+            beside: weights on each side of the middle of both; None: as many as needed.
         """
         down, across = (tent(*each) for each in zip((vertical, horizontal), beside, strict=True))
         return cls(down, across, "gaps between views filled by tents", (vertical, horizontal))
@@ -414,11 +415,11 @@ class AlongAxes(Brief, Value):
         return self._filtered(raster, self.down, self.across)
 
     def transpose(self, raster: Any) -> Any:
-        """Filtered by the weights in the other order."""
+        """Filtered by the reversed weights."""
         return self._filtered(raster, self.down[::-1], self.across[::-1])
 
     def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """The derivative to the weights along either axis; half widths are told, and nothing follows from them."""
+        """The derivative to the weights along either axis; half widths are informative, with derivative zero."""
         pulled = {}
         if "down" in wanted:
             back = _along(np.asarray(weights, np.float64), self.across[::-1], 1)
@@ -436,7 +437,7 @@ class AlongAxes(Brief, Value):
         return _mixed(raster, [(down, across)])
 
     def before(self, other: AlongAxes) -> AlongAxes:
-        """This filter and then another, as one."""
+        """This filter followed by another, as one filter."""
         words = f"{self.words}, {other.words}"
         return AlongAxes(np.convolve(self.down, other.down), np.convolve(self.across, other.across), words)
 
@@ -447,8 +448,8 @@ class Blur(Brief, Value):
 
     Args:
         kernel: in pixels, odd rows × odd columns.
-        words: what it is for.
-        scatters: whether it is what a diffuser does.
+        words: purpose.
+        scatters: whether it stands for a diffuser.
     """
 
     kernel: Array
@@ -456,11 +457,11 @@ class Blur(Brief, Value):
     scatters: bool = False
 
     def apply(self, raster: Any) -> Any:
-        """The raster (rows, columns, channels) convolved, as large as it was."""
+        """The raster (rows, columns, channels) convolved, of the same size."""
         return self._convolved(raster, self.kernel)
 
     def transpose(self, raster: Any) -> Any:
-        """Convolved with the kernel turned by 180°."""
+        """Convolved with the kernel rotated by 180°."""
         return self._convolved(raster, self.kernel[::-1, ::-1])
 
     def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
@@ -474,20 +475,21 @@ class Blur(Brief, Value):
             return _mixed(raster, separable_terms(kernel))
         from scipy.signal import oaconvolve
 
-        # In double precision: what Fourier transforms round to in the dark would else show.
+        # In double precision: otherwise rounding errors of the Fourier transforms would be visible in dark
+        # regions.
         wide = oaconvolve(raster.astype(np.float64), kernel[:, :, None], mode="same", axes=(0, 1))
         return without_rounding(wide)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OnSensor(Brief, Value):
-    """The sensor's part of the raster, through what lies against the sensor.
+    """The sensor's part of the raster, times the transmission of masks against the sensor.
 
     Args:
         guard: pixels of the raster on each side of the sensor.
-        transmission: mean over each pixel of what lies against the sensor, (rows, columns), or None.
-        detail: what its variation within pixels adds, from the light of each pixel's 3×3 neighbours, (3, 3, rows,
-            columns): [dy, dx] is the share of the pixel dy − 1 rows down and dx − 1 columns on; or None.
+        transmission: mean transmission of each pixel, (rows, columns), or None.
+        detail: effect of the mask's variation within pixels, from the light of each pixel's 3×3 neighbours, (3, 3,
+            rows, columns): [dy, dx] is the share of the pixel dy − 1 rows down and dx − 1 columns on; or None.
     """
 
     guard: int
@@ -495,7 +497,7 @@ class OnSensor(Brief, Value):
     detail: Array | None = None
 
     def apply(self, raster: Any) -> Any:
-        """The picture (rows, columns, channels) of a raster with ``guard`` pixels around it."""
+        """The image (rows, columns, channels) of a raster with ``guard`` pixels around it."""
         picture = self._part(raster, 0, 0)
         if self.transmission is not None:
             picture = picture * _like(raster, self.transmission)[..., None]
@@ -505,7 +507,7 @@ class OnSensor(Brief, Value):
         return picture
 
     def transpose(self, raster: Any) -> Any:
-        """What each pixel of the raster adds to a weighted sum of the picture: an array of NumPy."""
+        """The contribution of each pixel of the raster to a weighted sum of the image: an array of NumPy."""
         rows, columns, channels = raster.shape
         wide = np.zeros((rows + 2 * self.guard, columns + 2 * self.guard, channels))
         shares = [(0, 0, np.ones((rows, columns)) if self.transmission is None else self.transmission)]
@@ -516,7 +518,7 @@ class OnSensor(Brief, Value):
         return wide
 
     def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
-        """The derivative to the transmission, and to what its variation within pixels adds."""
+        """The derivative to the transmission, and to its variation within pixels."""
         pulled = {}
         if "transmission" in wanted:
             pulled["transmission"] = self._agreeing(raster, weights, 0, 0)
@@ -526,26 +528,26 @@ class OnSensor(Brief, Value):
         return pulled
 
     def _agreeing(self, raster: Any, weights: Any, down: int, across: int) -> Array:
-        """The weights times the light of the pixels so far away, summed over the channels."""
+        """The weights times the light of the pixels displaced by (down, across), summed over the channels."""
         part = self._part(raster, down, across)
         return np.asarray(np.einsum("rck,rck->rc", np.asarray(weights, np.float64), part))
 
     def _part(self, raster: Any, down: int, across: int) -> Any:
-        """The sensor's part of the raster, or what lies so many pixels further."""
+        """The sensor's part of the raster, displaced by so many pixels."""
         high, wide = raster.shape[0] - 2 * self.guard, raster.shape[1] - 2 * self.guard
         top, left = self.guard + down, self.guard + across
         return raster[top : top + high, left : left + wide, ...]
 
 
 def finished(after: Sequence[After], raster: Any) -> Any:
-    """The raster after all operators, in their order."""
+    """The raster after all operators, in order."""
     for operator in after:
         raster = operator.apply(raster)
     return raster
 
 
 def merged(after: Sequence[After]) -> Iterator[After]:
-    """The same with neighbouring filters along the axes made one."""
+    """The same operators, with neighbouring filters along the axes merged into one."""
     last: After | None = None
     for operator in after:
         if isinstance(last, AlongAxes) and isinstance(operator, AlongAxes):
@@ -566,7 +568,7 @@ def tent(half_width: float, beside: int | None = None) -> Array:
 
     Args:
         half_width: pixels; 0 for none.
-        beside: weights on each side of the middle; None: as many as it takes.
+        beside: weights on each side of the middle; None: as many as needed.
     """
     if half_width == 0:
         return np.ones(1)
@@ -576,7 +578,7 @@ def tent(half_width: float, beside: int | None = None) -> Array:
 
 
 def spreading_matrix(weights: Array, samples: int) -> Array:
-    """An odd number of weights as a matrix from samples to as many more as they reach, along one axis."""
+    """The matrix from samples along one axis to their full convolution with an odd number of weights."""
     matrix = np.zeros((samples + len(weights) - 1, samples))
     for shift, weight in enumerate(weights):
         matrix[np.arange(samples) + shift, np.arange(samples)] = weight
@@ -584,7 +586,7 @@ def spreading_matrix(weights: Array, samples: int) -> Array:
 
 
 def separable_terms(kernel: Array) -> list[tuple[Array, Array]]:
-    """A kernel (rows, columns) as a sum of products of a column and a row, right to `RANK_TOLERANCE`."""
+    """A kernel (rows, columns) as a sum of products of a column and a row, accurate to `RANK_TOLERANCE`."""
     down, strength, across = np.linalg.svd(kernel)
     return [
         (down[:, n] * strength[n], across[n])
@@ -594,12 +596,12 @@ def separable_terms(kernel: Array) -> list[tuple[Array, Array]]:
 
 
 def without_rounding(wide: Array) -> Array:
-    """What Fourier transforms leave of no light, set to none."""
+    """Set the rounding errors of Fourier transforms in dark regions to zero."""
     return np.where(np.abs(wide) < ROUNDING * np.abs(wide).max(initial=0), 0.0, wide)
 
 
 def _lags(weights: int) -> range:
-    """How far each of an odd number of weights moves what it weighs."""
+    """The displacements of an odd number of weights."""
     return range(-(weights // 2), weights // 2 + 1)
 
 
@@ -618,7 +620,7 @@ def _along(raster: NDArray[Any], weights: Array, axis: int) -> NDArray[Any]:
 
 
 def _mixed(raster: Any, terms: list[tuple[Array, Array]]) -> Any:
-    """The raster of any library filtered by a sum of products of a column and a row."""
+    """The raster of any library, filtered by a sum of products of a column and a row."""
     xp = array_namespace(raster)
     rows, columns = raster.shape[:2]
     total = None
@@ -632,7 +634,7 @@ def _mixed(raster: Any, terms: list[tuple[Array, Array]]) -> Any:
 
 
 def _band(weights: Array, pixels: int) -> Array:
-    """An odd number of weights as a matrix that filters so many pixels, dark beyond them."""
+    """The matrix of a filter with an odd number of weights on so many pixels, dark beyond them."""
     reach = len(weights) // 2
     matrix = np.zeros((pixels, pixels))
     for shift, weight in zip(range(-reach, reach + 1), weights, strict=True):
@@ -642,7 +644,7 @@ def _band(weights: Array, pixels: int) -> Array:
 
 
 def _like(raster: Any, numbers: Array) -> Any:
-    """NumPy numbers as an array of the library, type and device of another."""
+    """NumPy numbers as an array of the library, type and device of another array."""
     if isinstance(raster, np.ndarray):
         return numbers
     xp = array_namespace(raster)

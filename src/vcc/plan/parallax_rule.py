@@ -1,10 +1,10 @@
-"""How to fill the gaps between views: not at all, or along the parallax of the scene.
+"""Filling gaps between views: not at all, or along the parallax of the scene.
 
-A view stands for a cell of the aperture. Where the pictures that neighbouring views throw on the sensor lie
-less than about a pixel apart, their plain sum is the integral over the aperture. Further apart, the sum
-shows ghost copies; then each view's light is spread over a tent that reaches its neighbours, along the way
-that a point of the scene takes from one view's picture to the next. For a whole view that way is one
-vector, so the tent is one blur of the finished picture, whatever the views hold.
+A view stands for a cell of the aperture. If neighbouring views' images on the sensor are less than about a pixel
+apart, their plain sum is the integral over the aperture. If they are further apart, the sum shows ghost copies;
+then each view's light is spread over a tent that extends to its neighbours, along the displacement of a point of
+the scene from one view's image to the next. This displacement is one vector for a whole view, so the tent is one
+blur of the finished image, independent of the views' content.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False)
 class BetweenViews(Brief):
-    """The choice made.
+    """The chosen interpolation between views.
 
     Args:
-        motion: 2×2; how the point of the scene that is followed moves within a view, (k, l) per (i, j),
-            with the sign turned: it is seen at (k, l) − motion · (i, j).
-        gap_filled: (vertical, horizontal) distance in pixels between neighbouring views' pictures of that
-            point; 0 where nothing is filled.
-        gap_left: the largest gap in pixels that stays, over the distances that the scene has.
-        reason: in words.
+        motion: 2×2; displacement of the followed point of the scene within a view, (k, l) per (i, j),
+            with opposite sign: it is seen at (k, l) − motion · (i, j).
+        gap_filled: (vertical, horizontal) distance in pixels between neighbouring views' images of that
+            point; 0 if not filled.
+        gap_left: the largest remaining gap in pixels, over the distances in the scene.
+        reason: as text.
     """
 
     motion: Array
@@ -42,14 +42,14 @@ class BetweenViews(Brief):
     reason: str
 
     def like(self, other: BetweenViews) -> bool:
-        """Whether both fill the same gaps, however wide."""
+        """Whether both fill the same gaps, of any width."""
         return [gap > 0 for gap in self.gap_filled] == [gap > 0 for gap in other.gap_filled]
 
     def now(self, grid: Grid, on_sensor: Array) -> BetweenViews:
-        """The same for optics that have changed since.
+        """The same interpolation for optics that have changed since.
 
-        The motion is that of a point of the scene, which stays where it is. The gap that it leaves between the
-        pictures of neighbouring views is filled by what it is now.
+        The motion belongs to a point of the scene and does not change. The gap between neighbouring views'
+        images of this point is recomputed.
 
         Args:
             grid: of the light field.
@@ -65,7 +65,7 @@ class BetweenViews(Brief):
 
 
 def index_motions(frame: Affine, vergences: Array) -> Array:
-    """How points of the scene move within a view: (n, 2, 2), (k, l) per (i, j), sign turned.
+    """Displacements of points of the scene within a view: (n, 2, 2), (k, l) per (i, j), with opposite sign.
 
     Args:
         frame: of the light field.
@@ -81,16 +81,16 @@ def index_motions(frame: Affine, vergences: Array) -> Array:
 
 
 def choose_between_views(grid: Grid, frame: Affine, on_sensor: Array, how: How) -> BetweenViews:
-    """Decide by the gaps, in pixels, between neighbouring views' pictures over the scene's distances.
+    """Choose by the gaps, in pixels, between neighbouring views' images over the scene's distances.
 
-    In focus the gap is 0, so the gap filled is the geometric mean of the smallest and the largest: nothing
-    that is in focus gets blurred, and under strong defocus, where all gaps are alike, all are filled.
+    In focus the gap is 0, so the filled gap is the geometric mean of the smallest and the largest: objects in
+    focus are not blurred, and under strong defocus, with similar gaps at all distances, all gaps are filled.
 
     Args:
-        grid: whose disparities are asked for.
+        grid: provides the disparities.
         frame: its frame, as the plan uses it.
         on_sensor: 2×4, pixels per index step (i, j, k, l).
-        how: what was chosen of views in between, and of the scene's distance.
+        how: the options for views in between and the scene's distance.
     """
     rows, columns = grid.extent
     if rows <= 1 and columns <= 1:
@@ -103,7 +103,7 @@ def choose_between_views(grid: Grid, frame: Affine, on_sensor: Array, how: How) 
     else:
         motions = index_motions(frame, known)
         steps = on_sensor[:, :2] - on_sensor[:, 2:] @ motions
-    # Views go on along both axes, and the wider gap decides: cameras turned by 90° are treated alike.
+    # There are views along both axes, and the wider gap decides: cameras rotated by 90° are treated alike.
     axes = [axis for axis, views in enumerate((columns, rows)) if views > 1]
     along = steps[:, :, axes]
     gaps = np.linalg.norm(along, axis=1).max(axis=-1)
@@ -134,11 +134,11 @@ def choose_between_views(grid: Grid, frame: Affine, on_sensor: Array, how: How) 
 
 
 def vergences(grid: Grid, scene_distance: float | None) -> Array | None:
-    """1/Z of the scene in 1/m, evenly over its disparities; None where it shows no parallax.
+    """1/Z of the scene in 1/m, evenly over its disparities; None if it shows no parallax.
 
     Args:
-        grid: whose disparities are asked for.
-        scene_distance: metres before it, which then is all that counts, or None.
+        grid: provides the disparities.
+        scene_distance: in metres before the grid's plane, used instead of the disparities, or None.
 
     Raises:
         InputError: a distance of 0 or less.
@@ -156,7 +156,7 @@ def vergences(grid: Grid, scene_distance: float | None) -> Array | None:
 
 
 def _in_focus(on_sensor: Array) -> Array:
-    """The motion of what the camera is focused on: with no better knowledge, nothing is spread."""
+    """The motion of objects in focus: the default without disparities, which spreads nothing."""
     within = on_sensor[:, 2:]
     if abs(np.linalg.det(within)) < 1e-12:
         return np.zeros((2, 2))

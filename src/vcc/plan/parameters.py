@@ -1,7 +1,7 @@
-"""The numbers of a plan, by name: what derivatives are taken of, and what changes while a camera learns.
+"""The parameters of a plan, by name: the variables of derivatives, which change while a camera learns.
 
-A plan is choices (which core, how many taps, which footprint) and numbers (places, steps, weights, textures).
-The numbers of a value are all its floating-point leaves, named as they are reached: of a core
+A plan consists of choices (which core, how many taps, which footprint) and parameters (places, steps, weights,
+textures). The parameters of a value are all its floating-point leaves, named by their path: of a core
 ``"masks[0].texture"``, of operators ``"[1].kernel"``; an affine map is its matrix, a tuple of numbers one array.
 """
 
@@ -24,15 +24,14 @@ def parameters(thing: Any) -> dict[str, Array]:
     """All floating-point leaves of a dataclass, tuple, array or number, by name, as float64.
 
     Args:
-        thing: a core, an operator, or a tuple of them; dataclasses and tuples are gone through, whole numbers,
-            texts and whatever else is no floating-point number are passed over. Arrays in double precision are
-            handed out as they are, not copied.
+        thing: a core, an operator, or a tuple of them; dataclasses and tuples are traversed, integers, texts and
+            other values that are not floating-point are skipped. Arrays in double precision are not copied.
     """
     return dict(_leaves(thing, ""))
 
 
 def with_parameters(thing: Thing, changed: Mapping[str, Any]) -> Thing:
-    """The same with some of its numbers changed; those that are not named stay what they are.
+    """Return a copy with the given parameters changed.
 
     Args:
         thing: as for `parameters`.
@@ -45,7 +44,7 @@ def with_parameters(thing: Thing, changed: Mapping[str, Any]) -> Thing:
 
 
 def _parts(thing: Any) -> Iterator[tuple[str, Any]]:
-    """What a dataclass or a tuple is made of, with what is put behind its name."""
+    """The fields of a dataclass or the items of a tuple, with the suffix that each adds to the name."""
     if isinstance(thing, tuple):
         yield from ((f"[{n}]", part) for n, part in enumerate(thing))
     elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
@@ -53,7 +52,7 @@ def _parts(thing: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _leaf(thing: Any) -> Array | None:
-    """A thing as an array of numbers; None where it is none."""
+    """A leaf as an array of numbers; None if the value is not a leaf."""
     if isinstance(thing, Affine):
         return thing.matrix
     if isinstance(thing, np.ndarray):
@@ -72,7 +71,7 @@ def _leaves(thing: Any, name: str) -> Iterator[tuple[str, Array]]:
 
 
 def _changed(thing: Any, name: str, changed: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """The thing with what is named changed, and what of that was not found in it."""
+    """The value with the named parameters changed, and the changes whose names were not found in it."""
     if _leaf(thing) is not None:
         own = name.lstrip(".")
         if own not in changed:
@@ -91,7 +90,7 @@ def _changed(thing: Any, name: str, changed: dict[str, Any]) -> tuple[Any, dict[
 
 
 def _like(thing: Any, value: Any) -> Any:
-    """Numbers as the kind of leaf that a thing is."""
+    """Numbers converted to the kind of a leaf."""
     if isinstance(thing, Affine):
         return Affine(np.asarray(value, dtype=np.float64))
     if isinstance(thing, np.ndarray):

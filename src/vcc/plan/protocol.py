@@ -1,4 +1,4 @@
-"""What plans and engines owe one another: cores say what is computed, engines compute it, parts add up."""
+"""The interfaces of cores and engines: cores define the computation, engines run it, partial results add up."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from vcc.base.workers import Workers
 from vcc.fields.grid import Block
 
 OutputBuffers = Callable[[Sequence[int]], NDArray[np.float32] | None]
-"""Gives the memory (cameras, rows, columns[, channels]) in which pictures of some cameras, by their numbers, are
-made, if there is any; new memory takes long."""
+"""Returns the memory (cameras, rows, columns[, channels]) for the images of the cameras with these numbers, or
+None for new memory, whose allocation takes long."""
 
 
 @dataclass(frozen=True, eq=False)
 class Partial:
-    """A raster of part of the light: sums that add up.
+    """A raster of a part of the light; partial rasters add up.
 
     Args:
         values: irradiance, (rows, columns, channels), an array of the library of the samples.
-        difference: what the two halves of a pixel's rays found, one minus the other, like ``values``; None where
+        difference: result of one half of a pixel's rays minus that of the other half, like ``values``; None if
             nothing is sampled.
-        rays: how many were traced; 0 for footprints.
+        rays: number of traced rays; 0 for footprints.
         samples: rays a pixel; 0 for footprints.
     """
 
@@ -37,7 +37,7 @@ class Partial:
     samples: int = 0
 
     def __add__(self, other: Partial) -> Partial:
-        """The raster of more of the samples, by the same rays."""
+        """Add the raster of other samples by the same rays."""
         return replace(
             self,
             values=self.values + other.values,
@@ -45,7 +45,7 @@ class Partial:
         )
 
     def with_rays(self, other: Partial) -> Partial:
-        """The raster of the same samples by as many other rays, beside those there are."""
+        """Combine with the raster of the same samples by equally many other rays."""
         return Partial(
             values=(self.values + other.values) / 2,
             difference=self.values - other.values,
@@ -56,13 +56,13 @@ class Partial:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Gradient(Brief):
-    """What a raster's weights say of all that it was made from: sums that add up, like `Partial`.
+    """The gradient of a raster's weighted sum with respect to its inputs; gradients add up, like `Partial`.
 
     With weights G of the raster I, every change obeys
-    ⟨G, dI⟩ = ⟨samples, d(samples)⟩ + Σ ⟨numbers[name], d(number of this name)⟩.
+    ⟨G, dI⟩ = ⟨samples, d(samples)⟩ + Σ ⟨gradients[name], d(parameter of this name)⟩.
 
     Args:
-        samples: like the samples that the core took, (v, u, t, s[, channels]); None where nobody asked.
+        samples: like the samples of the core, (v, u, t, s[, channels]); None if not requested.
         gradients: by parameter (`vcc.plan.parameters`), float64, each of the parameter's shape.
     """
 
@@ -76,10 +76,10 @@ class Gradient(Brief):
         numbers: Callable[[Progress | None], Mapping[str, NDArray[np.float64]]] | None,
         progress: Progress | None,
     ) -> Gradient:
-        """What is said of samples, and then what is said of numbers; None for what nobody asked.
+        """The gradient of samples, then of parameters; None for what is not requested.
 
         Args:
-            samples: finds it, and calls the progress that it is given.
+            samples: computes it, and calls the progress that it receives.
             numbers: likewise.
             progress: of both together.
         """
@@ -90,7 +90,7 @@ class Gradient(Brief):
         )
 
     def __add__(self, other: Gradient) -> Gradient:
-        """What two rasters, or two parts of one, say of the same samples and numbers."""
+        """Sum of the gradients of two rasters, or of two parts of one, for the same samples and parameters."""
         names = dict.fromkeys([*self.gradients, *other.gradients])
         none = self.samples is None or other.samples is None
         return Gradient(
@@ -103,7 +103,7 @@ class Gradient(Brief):
 
 
 class Runner(Protocol):
-    """How a core is run on samples."""
+    """Function that runs a core on samples."""
 
     def __call__(
         self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
@@ -114,15 +114,15 @@ class Runner(Protocol):
 
 @dataclass(frozen=True)
 class Abilities:
-    """What an engine can do, known before it is loaded.
+    """Features of an engine, known before it is loaded.
 
     Args:
-        double: it computes floating-point samples in double precision, and gives pictures in it.
-        copies: it converts all samples that it is given first, which takes memory.
-        parallel: it takes NumPy arrays, uses several threads, and has several cores share work (`Engine.batch`).
-        bands: its rays look at bands of rows of pixels, so that a store need not be read as a whole.
-        no_derivatives: why it does not go backwards, in words; "" where it does.
-        no_learning: why it does not go backwards to all numbers of a plan; "" where it does.
+        double: it computes floating-point samples, and their images, in double precision.
+        copies: it first converts all samples, which takes memory.
+        parallel: it accepts NumPy arrays, uses several threads, and shares work between cores (`Engine.batch`).
+        bands: its rays read bands of rows of pixels, so that a stored light field need not be read as a whole.
+        no_derivatives: why it computes no gradients, as text; "" if it does.
+        no_learning: why it does not compute gradients of all parameters of a plan; "" if it does.
     """
 
     double: bool = False
@@ -134,7 +134,7 @@ class Abilities:
 
 
 class Engine(Protocol):
-    """What computes: a module with these functions. docs/how-it-works.md shows one of thirty lines."""
+    """A module with these functions, which computes rasters. docs/how-it-works.md shows one of thirty lines."""
 
     def run(
         self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
@@ -142,10 +142,10 @@ class Engine(Protocol):
         """The raster of samples.
 
         Args:
-            core: what is computed: footprints or rays.
-            values: the samples, (v, u, t, s[, channels]), as `prepared` gives them.
-            beside: 0, or 1 for as many other rays, of the neighbouring block of points.
-            threads: how many work at once.
+            core: the computation: footprints or rays.
+            values: the samples, (v, u, t, s[, channels]), as `prepared` returns them.
+            beside: 0, or 1 for equally many other rays, of the neighbouring block of points.
+            threads: number of concurrent threads.
             progress: called with (done, total).
         """
         ...
@@ -153,18 +153,19 @@ class Engine(Protocol):
     def batch(
         self, cores: Sequence[Any], values: Any, *, pool: Workers, then: Callable[[int, Partial], Any]
     ) -> list[Any]:
-        """What follows from rasters of the same samples by several cores, which share what they can of the work.
+        """Apply a function to the rasters of the same samples by several cores, which share work if possible.
 
-        Asked of engines that are `Abilities.parallel`; others run one core after the other.
+        Called only if `Abilities.parallel`; other engines run one core after the other.
 
         Args:
-            cores: what is computed.
+            cores: the computations.
             values: the samples.
-            pool: whose threads work. Those that are there keep their memory; new memory takes long.
-            then: called with the number of a core and its raster, in one of the threads, as soon as that is made.
+            pool: provides the threads. Existing threads keep their memory; allocating memory takes long.
+            then: called with the number of a core and its raster, in one of the threads, as soon as the raster is
+                ready.
 
         Returns:
-            What ``then`` gives for each core.
+            The result of ``then`` for each core.
         """
         ...
 
@@ -180,72 +181,75 @@ class Engine(Protocol):
         threads: int,
         progress: Progress | None = None,
     ) -> Gradient:
-        """The derivative of ⟨raster, what `run` makes of the same⟩.
+        """The gradient of ⟨raster, result of `run`⟩.
 
-        The same bytes from run to run, whatever the number of threads.
+        The result is the same to the bit for any number of threads.
 
         Args:
-            core: what is computed.
-            values: the samples, (v, u, t, s[, channels]). A core is linear in them: of an array without content
-                (``np.broadcast_to(np.float32(0), shape)``) only the shape is looked at where no number is wanted.
+            core: the computation.
+            values: the samples, (v, u, t, s[, channels]). A core is linear in them: if no parameter is wanted,
+                only the shape is used, and an array without content (``np.broadcast_to(np.float32(0), shape)``)
+                is enough.
             raster: weights of the raster's values, (rows, columns, channels).
-            samples: whether the derivative to the samples is wanted: an array of their shape, float32 (float64
-                where the engine is `Abilities.double`).
-            wanted: names of the core's numbers to which it is wanted (`vcc.plan.parameters.numbers` of the core).
+            samples: whether to compute the gradient of the samples: an array of their shape, float32 (float64
+                if the engine is `Abilities.double`).
+            wanted: names of the core's parameters to differentiate (`vcc.plan.parameters.parameters` of the core).
             beside: see `run`.
-            threads: how many work at once.
+            threads: number of concurrent threads.
             progress: called with (done, total).
 
         Raises:
-            InputError: a number to which there is no derivative, named.
+            InputError: a parameter without a derivative, named.
         """
         ...
 
     def prepared(self, before: Sequence[Any], values: Any, threads: int, core: Any = None) -> Any:
-        """Samples (v, u, t, s[, channels]) as a core takes them, after all operators before it.
+        """Samples (v, u, t, s[, channels]) in the form that a core reads, after all operators before it.
 
         Args:
             before: the operators.
             values: the samples.
-            threads: how many work at once.
-            core: given, what comes out is for `run` of this core alone, which may prepare samples where it looks
-                at them; ``shape`` is then all that may be asked of it.
+            threads: number of concurrent threads.
+            core: if given, the result is for `run` of this core alone, which may prepare samples lazily; then
+                only ``shape`` of the result may be read.
         """
         ...
 
     def prepared_back(
         self, before: Sequence[Any], values: Any, threads: int, *, written_over: bool = False
     ) -> Any:
-        """The transpose of `prepared`: of weights of the samples that a core takes, those of the samples given.
+        """The transpose of `prepared`: from weights of the samples that a core reads to weights of the given
+        samples.
 
-        The operators' ``transpose``, the last one first. Each is the adjoint of its operator on real numbers: what
-        whole numbers are rounded to is left out, and so is what one of them stands for. Where samples of 8 bits
-        are kept as whole numbers of 16, each of which stands for ``kept_as(kind)[1]`` of a sample's, who calls
-        divides by this: a step of one in a sample is so many of theirs.
+        Applies the operators' ``transpose``, the last operator first. Each is the adjoint of its operator on real
+        numbers: rounding to integers and the scale of the integers are ignored. If 8-bit samples are stored as
+            16-bit
+        integers, each of which stands for ``kept_as(kind)[1]`` of a sample's step, the caller divides by this
+        factor.
 
         Args:
             before: the operators, in the order in which they are applied.
-            values: weights (v, u, t, s[, channels]) of what comes out of the last one.
-            threads: how many work at once.
-            written_over: whether ``values`` may be, as nobody needs them any more: new memory takes long.
+            values: weights (v, u, t, s[, channels]) of the result of the last operator.
+            threads: number of concurrent threads.
+            written_over: whether ``values`` may be overwritten, since allocating memory takes long.
 
         Returns:
-            Of the shape of the samples that the first one takes: float32 (float64 where the engine is
+            Of the shape of the samples that the first operator reads: float32 (float64 if the engine is
             `Abilities.double`).
         """
         ...
 
     def finished(self, after: Sequence[Any], raster: Any, threads: int) -> Any:
-        """The picture (rows, columns, channels) of a raster after all operators, in the engine's precision."""
+        """The image (rows, columns, channels) of a raster after all operators, in the engine's precision."""
         ...
 
     def memory(self, core: Any, channels: int, threads: int) -> int:
-        """Bytes that a run takes beside the samples and the raster, estimated."""
+        """Estimated bytes that a run needs in addition to the samples and the raster."""
         ...
 
 
 class Core(Protocol):
-    """The middle of a plan: what turns samples into a raster."""
+    """The middle of a plan: turns samples into a raster."""
 
     @property
     def method(self) -> str:
@@ -254,57 +258,57 @@ class Core(Protocol):
 
     @property
     def border(self) -> int:
-        """Views around a block that are looked at with it."""
+        """Views around a block that are read with it."""
         ...
 
     @property
     def scale(self) -> float:
-        """Turns samples, which are radiance, into it or into irradiance times shares; see `scaled`."""
+        """Factor from samples (radiance) to the raster (radiance, or irradiance times shares); see `scaled`."""
         ...
 
     @property
     def raster_shape(self) -> tuple[int, int]:
-        """(rows, columns) of what it makes."""
+        """(rows, columns) of the raster."""
         ...
 
     def part(self, block: Block) -> Any:
-        """What runs on a block of samples; the parts' rasters add up."""
+        """The core for a block of samples; the rasters of all parts add up."""
         ...
 
     def required(self, wanted: Collection[str]) -> Collection[str]:
-        """The numbers of a part to which derivatives make up those to some of the core's numbers."""
+        """The parameters of a part whose derivatives are needed for the given parameters of the core."""
         ...
 
     def full_gradients(
         self, block: Block, numbers: Mapping[str, NDArray[np.float64]]
     ) -> dict[str, NDArray[np.float64]]:
-        """Derivatives to the numbers of a `part`, by name, as those to the core's own; the parts' add up."""
+        """Convert derivatives to the parameters of a `part`, by name, to the core's own; all parts add up."""
         ...
 
     def scaled(self, factor: float) -> Any:
-        """For samples whose numbers stand for ``factor`` times as much."""
+        """The core for samples whose numbers stand for ``factor`` times as much."""
         ...
 
     def more(self, samples: int) -> Any:
-        """With so many rays a pixel, to be taken beside as many that there are; the same where none are traced."""
+        """The core with ``samples`` more rays a pixel, taken in addition; the same core if no rays are traced."""
         ...
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Which of the views of a light field of this shape are looked at, (v, u)."""
+        """The views that are used of a light field of this shape, (v, u)."""
         ...
 
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """Which pixels of each view may be looked at.
+        """The pixels of each view that may be used.
 
         Args:
-            shape: (v, u, t, s[, channels]) of the samples that the core takes.
+            shape: (v, u, t, s[, channels]) of the samples that the core reads.
 
         Returns:
-            The first, and the one after the last, of rows and of columns: (v, u, 2, 2). They may go beyond a view.
+            First and stop of rows and of columns: (v, u, 2, 2). They may extend beyond a view.
         """
         ...
 
     @property
     def samples_touched(self) -> int:
-        """How many samples an engine goes through, those that it goes through twice counted twice."""
+        """Number of samples that an engine processes, repeated reads counted repeatedly."""
         ...

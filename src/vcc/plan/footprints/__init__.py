@@ -1,1 +1,1 @@
-"""Pictures by footprints: what each sample adds to which pixels, as plain data, and the compiler that makes it."""
+"""Images by footprints: a plan of the light that each sample adds to each pixel, and its compiler."""

@@ -1,4 +1,4 @@
-"""What absorbs light, by where samples meet it: at the views, in mid-path, against the sensor."""
+"""Absorbing elements, sorted by where samples meet them: at the views, in mid-path, against the sensor."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class AbsorbingChoices:
-    """In which planes masks are taken together.
+    """The planes in which masks are combined.
 
     Args:
-        stacked: how many masks stand in each plane, from the front.
-        against_sensor: which planes lie against the sensor.
-        planes: what counts in each of them.
+        stacked: number of masks in each plane, from the front.
+        against_sensor: for each plane, whether it lies against the sensor.
+        planes: choices for each plane.
     """
 
     stacked: tuple[int, ...] = choice("which masks stand in one plane")
@@ -33,7 +33,7 @@ class AbsorbingChoices:
 
 
 def choose_absorbing(train: Train, landing: Landing) -> AbsorbingChoices:
-    """In which planes masks are taken together: those in which samples meet them."""
+    """Choose the planes in which masks are combined: those in which samples meet several masks in one place."""
     groups = _in_one_place(train, landing)
     return AbsorbingChoices(
         tuple(len(stages) for _, stages in groups),
@@ -44,12 +44,12 @@ def choose_absorbing(train: Train, landing: Landing) -> AbsorbingChoices:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Absorbing(Brief):
-    """Planes of what absorbs.
+    """Planes of absorbing elements.
 
     Args:
-        at_views: which tell views apart only: one weight a view.
+        at_views: each view meets them in one point: one weight a view.
         in_path: in mid-path: one weight a sample.
-        against_sensor: which multiply the picture.
+        against_sensor: factors of the image.
     """
 
     at_views: list[Plane]
@@ -58,13 +58,14 @@ class Absorbing(Brief):
 
     @classmethod
     def of(cls, train: Train, landing: Landing, choices: AbsorbingChoices) -> Absorbing:
-        """The planes of a train, those at the views not yet told apart from those in mid-path.
+        """The planes of a train; planes at the views are still among those in mid-path.
 
-        Rewrite rule: a mask whose every ray meets it where it meets the sensor multiplies the picture.
-        Precondition: the place on the mask is the place on the sensor, shifted at most, for every sample.
+        Rewrite rule: a mask that every ray meets at the place where it meets the sensor multiplies the image.
+        Precondition: for every sample, the place on the mask is the place on the sensor, apart from a constant
+            shift.
 
         Raises:
-            InputError: planes that do not stay what was chosen.
+            InputError: planes that are no longer as chosen.
         """
         groups = _in_one_place(train, landing)
         together = tuple(len(stages) for _, stages in groups)
@@ -72,22 +73,22 @@ class Absorbing(Brief):
         against = tuple(_same_place(place, landing.metres) for place, _ in groups)
         check_unchanged("which masks stand against the sensor", choices.against_sensor, against)
         planes = [
-            # What stands in one plane is multiplied there, before anything is averaged.
+            # Masks in one plane are multiplied there, before anything is averaged.
             Plane.at(place, _placed(stages), " and ".join(dict.fromkeys(s.element.label for s in stages)), counts)
             for (place, stages), counts in zip(groups, choices.planes, strict=True)
         ]
         return cls([], _of(planes, against, False), _of(planes, against, True))
 
     def parted(self, landing: Landing, motion: Array, at_views: tuple[bool, ...]) -> Absorbing:
-        """The same, with planes at the views.
+        """The same, with the planes at the views separated.
 
         Args:
             landing: of the samples.
             motion: of the scene that views follow, see `tap_origin`.
-            at_views: which planes are, of those in mid-path.
+            at_views: for each plane in mid-path, whether it is at the views.
 
         Raises:
-            InputError: one of them is no longer.
+            InputError: one of them is no longer at the views.
         """
         now = (depends_on_view_only(plane, landing.samples, motion) for plane in self.in_path)
         if any(was and not so for was, so in zip(at_views, now, strict=True)):
@@ -99,7 +100,7 @@ class Absorbing(Brief):
 def choose_at_views(
     planes: list[Plane], landing: Landing, motion: Array, follow: Follow | None
 ) -> tuple[bool, ...]:
-    """Which planes are taken for one weight a view: those that tell views apart only, and stay where they do."""
+    """Choose the planes that become one weight a view: each view meets them in one point, and they stay there."""
     leaving = frozenset() if follow is None else follow.leaving
     return tuple(
         depends_on_view_only(plane, landing.samples, motion) and plane.label not in leaving for plane in planes
@@ -107,7 +108,7 @@ def choose_at_views(
 
 
 def _in_one_place(train: Train, landing: Landing) -> list[tuple[Array, list[Stage]]]:
-    """Stages that absorb, with the place in which samples meet them, neighbours in one place together."""
+    """Absorbing stages with the place in which samples meet them; neighbours in one place are grouped."""
     groups: list[tuple[Array, list[Stage]]] = []
     for stage in train.stages:
         if stage.faces.pattern is None or isinstance(stage.faces.pattern, Open):

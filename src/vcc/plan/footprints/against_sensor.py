@@ -1,4 +1,4 @@
-"""Masks against the sensor: what each pixel keeps, and what their variation within pixels does."""
+"""Masks against the sensor: mean transmission of each pixel, and the effect of their variation within pixels."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from vcc.shapes.patterns import Cells
 Array = NDArray[np.float64]
 
 PARTS_OF_A_PIXEL = 4
-"""Parts each way by which a mask against the sensor is looked at within pixels."""
+"""Parts each way into which pixels are divided to sample a mask against the sensor."""
 
 
 Means = tuple[MeanChoice | None, ...]
@@ -28,11 +28,11 @@ Means = tuple[MeanChoice | None, ...]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeansOnSensor(Brief):
-    """How means of masks against the sensor are taken, of each mask.
+    """How means of each mask against the sensor are computed.
 
     Args:
         pixels: over the sensitive areas of pixels.
-        parts: over parts of them.
+        parts: over parts of these areas.
     """
 
     pixels: Means
@@ -40,7 +40,7 @@ class MeansOnSensor(Brief):
 
 
 def choose_means(sensor: Sensor, planes: list[Plane]) -> MeansOnSensor:
-    """How means of masks against the sensor are taken so that they follow a camera."""
+    """Choose how means of masks against the sensor are computed so that they follow a camera."""
     pixels, parts = (
         tuple(choose_mean(plane.pattern, _seen(plane, boxes)) for plane in planes)
         for boxes in (_pixels(sensor), _parts(sensor))
@@ -51,13 +51,13 @@ def choose_means(sensor: Sensor, planes: list[Plane]) -> MeansOnSensor:
 def transmission(
     sensor: Sensor, planes: list[Plane], means: MeansOnSensor | None = None, parts: Parts = NONE_KEPT
 ) -> Array | None:
-    """The mean transmission over each pixel of what lies against the sensor; None without masks.
+    """The mean transmission over each pixel of the masks against the sensor; None without masks.
 
     Args:
         sensor: of the camera.
         planes: the masks.
-        means: how theirs are taken; None: by patterns themselves.
-        parts: what is kept of plans nearby.
+        means: how their means are computed; None: by the patterns' own `mean`.
+        parts: cached parts of nearby plans.
     """
     if not planes:
         return None
@@ -68,22 +68,20 @@ def transmission(
 def transmission_back(
     sensor: Sensor, planes: list[Plane], means: MeansOnSensor, weights: Array, cells: Cells
 ) -> Array:
-    """From weights of `transmission` to weights of the cells of a mask, one of the planes'."""
+    """From weights of `transmission` to weights of the cells of one of the planes' masks."""
     return _means_back(planes, _pixels(sensor), means.pixels, weights, cells)
 
 
 def detail(
     sensor: Sensor, planes: list[Plane], means: MeansOnSensor | None = None, parts: Parts = NONE_KEPT
 ) -> Array | None:
-    """What the variation of a mask against the sensor within pixels does; see `vcc.plan.operators.OnSensor`.
+    """The effect of a mask's variation within pixels; see `vcc.plan.operators.OnSensor`. None without masks.
 
-    The mean of a product is not the product of the means. With the light in a pixel as its mean P, slope and
-    curvature, told from its neighbours, and T̄, Tₓ, Tₓₓ, Tₓᵧ the mask's moments over the sensitive area of width a,
-    in pixels, the mean of mask times light is
+    The mean of a product is not the product of the means. The light in a pixel is described by its mean P, slope
+    and curvature, estimated from its neighbours. With T̄, Tₓ, Tₓₓ, Tₓᵧ the mask's moments over the sensitive
+    area of width a, in pixels, the mean of mask times light is
 
         T̄·P + Σₓ [Tₓ·(P₊ − P₋)/2 + (Tₓₓ/2 − T̄·a²/24)·(P₊ − 2P + P₋)] + Tₓᵧ·∂²P/∂x∂y.
-
-    None without masks.
     """
     if not planes:
         return None
@@ -94,19 +92,19 @@ def detail(
 
 
 def counts(found: Array | None) -> bool:
-    """Whether the variation of masks within pixels, `detail`, does anything."""
+    """Whether the effect of masks' variation within pixels, `detail`, is not negligible."""
     return found is not None and bool(np.abs(found).max() > 1e-6)
 
 
 def detail_back(sensor: Sensor, planes: list[Plane], means: MeansOnSensor, weights: Array, cells: Cells) -> Array:
-    """From weights of `detail` to weights of the cells of a mask, one of the planes'."""
+    """From weights of `detail` to weights of the cells of one of the planes' masks."""
     blocks = np.einsum("yxpq,yxrc->rpcq", _moments(sensor), weights, optimize=True)
     places = tuple(n * PARTS_OF_A_PIXEL for n in sensor.shape)
     return _means_back(planes, _parts(sensor), means.parts, blocks.reshape(places), cells)
 
 
 def _moments(sensor: Sensor) -> Array:
-    """What the mean over each part of a pixel adds to `detail`, (3, 3, parts down, parts across)."""
+    """Contribution of the mean over each part of a pixel to `detail`, (3, 3, parts down, parts across)."""
     opening, parts = math.sqrt(sensor.fill_factor), PARTS_OF_A_PIXEL
     place = _within(opening)
     one, square = np.ones(parts), place**2 + (opening / parts) ** 2 / 12
@@ -130,7 +128,7 @@ def _moments(sensor: Sensor) -> Array:
 
 
 def _within(opening: float) -> Array:
-    """Middles of the parts of a pixel, in pixels from its own."""
+    """Middles of the parts of a pixel, in pixels from the pixel's middle."""
     return np.asarray(((np.arange(PARTS_OF_A_PIXEL) + 0.5) / PARTS_OF_A_PIXEL - 0.5) * opening)
 
 
@@ -150,7 +148,7 @@ def _parts(sensor: Sensor) -> Boxes:
 
 
 def _seen(plane: Plane, boxes: Boxes) -> Boxes:
-    """Boxes counted from the middle of a mask."""
+    """Boxes relative to the middle of a mask."""
     return boxes._replace(x=boxes.x - plane.decentre[0], y=boxes.y - plane.decentre[1])
 
 

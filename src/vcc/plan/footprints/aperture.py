@@ -1,4 +1,4 @@
-"""Masks at the views as the taps of a plan meet them: the open share of each cell, and where it is."""
+"""Masks at the views as the taps of a plan meet them: the open share of each cell, and its place."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from vcc.shapes.patterns import Cells, is_grid
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""Of a cell: less light is what areas that cancel leave, and its middle would jump about."""
+"""Share of a cell: less light is the residue of areas that cancel, and its middle would jump."""
 PARTS_OF_A_CELL = 6
-"""Parts each way by which the open part of a view's cell is found."""
+"""Parts each way by which the place of the open part of a view's cell is estimated."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OpenParts(Brief):
-    """What of each tap's cell of the aperture is open.
+    """The open part of each tap's cell of the aperture.
 
     Args:
         weights: the open share of each tap's cell, (rows of taps, columns of taps).
@@ -39,16 +39,16 @@ class OpenParts(Brief):
 
 
 Tiles = tuple[tuple[MeanChoice | None, ...], ...]
-"""How means are taken, by plane, and by the rectangles that stand for a cell there."""
+"""How means are computed, by plane, and by the rectangles that stand for a cell there."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellChoices(Brief):
-    """What is chosen of the cells of taps of one level.
+    """Choices for the cells of taps of one level.
 
     Args:
-        whole: how means over cells are taken.
-        parts: how those over parts of cells are.
+        whole: how means over cells are computed.
+        parts: how means over parts of cells are computed.
         lit: which taps are lit.
     """
 
@@ -59,14 +59,14 @@ class CellChoices(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Aperture(Brief):
-    """Planes that tell views apart only, as the taps of a plan meet them.
+    """Planes on which each view falls into one point, as the taps of a plan meet them.
 
     Args:
         planes: one or several.
         taps: of the plan.
         motion: of the scene.
         samples: (rows, columns) of a view.
-        chosen: of taps of each level, where numbers follow a camera.
+        chosen: for taps of each level, if parameters follow a camera.
     """
 
     planes: list[Plane]
@@ -76,17 +76,17 @@ class Aperture(Brief):
     chosen: tuple[CellChoices, ...] | None = None
 
     def choices(self) -> tuple[CellChoices, ...]:
-        """What is chosen of the cells of taps of each level so that numbers follow a camera."""
+        """Choose how the cells of taps of each level are averaged so that parameters follow a camera."""
         return tuple(cells.choices() for cells in self._cells())
 
     def open_parts(self, parts: Parts = NONE_KEPT) -> OpenParts:
-        """What of each tap's cell is open.
+        """The open part of each tap's cell.
 
-        A cell that a rim cuts is lit through a part of it, and what other masks do to that light they do around
-        the middle of that part.
+        If a rim cuts a cell, light passes a part of the cell. Other masks act on this light at the middle of
+        that part.
 
         Args:
-            parts: what is kept of plans nearby.
+            parts: cached parts of nearby plans.
         """
         return parts.part(
             "what is open of views",
@@ -118,10 +118,10 @@ class Aperture(Brief):
         return weights
 
     def open_shares_of(self, cells: Cells, values: Array) -> Array | None:
-        """`open_shares` with several arrays (arrays, rows, columns) in the place of the only plane's cells.
+        """`open_shares` for several arrays (arrays, rows, columns) in place of the only plane's cells.
 
         Returns:
-            (arrays, rows of taps, columns of taps); None where they have to be found one by one.
+            (arrays, rows of taps, columns of taps); None if they have to be computed one by one.
         """
         (here, *others) = self._cells()
         if others or not here.closed or self.planes[0].pattern is not cells:
@@ -132,7 +132,7 @@ class Aperture(Brief):
         return cells.means(values, boxes.x.ravel(), boxes.y.ravel(), boxes.width, boxes.height)
 
     def back(self, weights: OpenParts, cells: Cells) -> Array:
-        """From weights of `open_parts` to weights of the cells of one of the planes, this very object."""
+        """From weights of `open_parts` to weights of the cells of one of the planes (the same object)."""
         total, middles = np.zeros(cells.values.shape), self.open_parts().middle
         for here in self._cells():
             shares = here.parts()
@@ -162,13 +162,13 @@ class Aperture(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Cells(Brief):
-    """The cells of taps of one level, and what is open of them.
+    """The cells of taps of one level, and their open parts.
 
     Args:
-        aperture: whose taps.
+        aperture: of the taps.
         mesh: an open mesh of their (rows, columns).
-        divide: parts of a view's cell that they are, each way.
-        chosen: of them; None where numbers follow nothing.
+        divide: parts into which a view's cell is divided each way; each cell is one part.
+        chosen: for these cells; None if parameters follow no camera.
     """
 
     aperture: Aperture
@@ -177,7 +177,7 @@ class _Cells(Brief):
     chosen: CellChoices | None
 
     def choices(self) -> CellChoices:
-        """What is chosen of them so that numbers follow a camera."""
+        """Choose how the cells are averaged so that parameters follow a camera."""
         planes = [plane.pattern for plane in self.aperture.planes]
         whole, parts = (
             tuple(tuple(choose_mean(pattern, box) for box, _ in boxes(n)) for n, pattern in enumerate(planes))
@@ -197,21 +197,21 @@ class _Cells(Brief):
 
     @property
     def inside(self) -> Array:
-        """Middles of the parts of a cell, in views from its own, (parts, parts, 2)."""
+        """Middles of the parts of a cell, in views from the cell's middle, (parts, parts, 2)."""
         part = ((np.arange(PARTS_OF_A_CELL) + 0.5) / PARTS_OF_A_CELL - 0.5) / self.divide
         return np.stack(np.meshgrid(part, part), axis=-1)
 
     @property
     def closed(self) -> bool:
-        """Whether what is open of a whole cell is known by itself: through one plane, in cells along its axes.
+        """Whether the open share of a whole cell is exact: there is one plane, and cells lie along its axes.
 
-        What several leave of a cell is not the product of their shares, and means over rectangles that stand for
-        a cell that is turned are those of its parts.
+        The open share through several planes is not the product of their shares. For a rotated cell, the means
+        over the rectangles that stand for it come from its parts.
         """
         return len(self.aperture.planes) == 1 and len(self.whole(0)) == 1
 
     def open_shares(self, shares: Array | None = None) -> Array:
-        """The open share of each cell, (rows, columns); ``shares``: the product of `parts` where it is known."""
+        """The open share of each cell, (rows, columns); ``shares``: the product of `parts` if already computed."""
         if self.closed:
             return self._means(0, whole=True)
         return np.asarray((_product(self.parts()) if shares is None else shares).mean(axis=(2, 3)))
@@ -221,7 +221,7 @@ class _Cells(Brief):
         return [self._means(n, whole=False) for n in range(len(self.aperture.planes))]
 
     def back(self, n: int, weights: Array, cells: Cells, whole: bool) -> Array:
-        """From weights of the open shares of whole cells, or of their parts, to those of a plane's cells."""
+        """From weights of the open shares of whole cells, or of their parts, to weights of a plane's cells."""
         pattern = self.aperture.planes[n].pattern
         found = [
             mean_back(pattern, box, its, share * weights, cells) for box, share, its in self._rectangles(n, whole)
@@ -253,7 +253,7 @@ class _Cells(Brief):
         return aperture.planes[n].boxes(index, shift, aperture.motion, aperture.samples, parts)
 
     def _rectangles(self, n: int, whole: bool) -> list[tuple[Boxes, float, MeanChoice | None]]:
-        """The rectangles of cells, or of their parts, their shares, and how means over them are taken."""
+        """The rectangles of cells, or of their parts, with their shares and how means over them are computed."""
         boxes = self.whole(n) if whole else self._divided(n)
         if self.chosen is None:
             return [(box, share, None) for box, share in boxes]

@@ -1,4 +1,4 @@
-"""What is done to samples before footprints and to the picture after them: gaps, diffusers, sharpness, masks."""
+"""Operators before and after the footprints: gaps between views, diffusers, sharpening, masks on the sensor."""
 
 from __future__ import annotations
 
@@ -22,26 +22,27 @@ from vcc.plan.sharpening import BOX, MEAN, TENT, across_plane, along_axis, filte
 Array = NDArray[np.float64]
 
 FINER_PIXELS = 1.25
-"""Pixels from sample to sample from which on they see how samples are interpolated between."""
+"""Pixels from sample to sample above which pixels resolve the interpolation between samples."""
 LARGEST_SHEARED_FILTER = 6
 """Weights on each side of the middle of a filter for a sheared pixel grid."""
 FAR = 2**24
-"""Pixels of the sensor and of what the filter of a sharp picture looks at around it, two samples on each side.
-Beyond that, where a sample is a thousand pixels wide, samples are interpolated by cubics and nothing is filtered:
-41 to 50 dB where sharp pictures have 43 to 45 and linear ones 33 to 39 (cosines of 5.5 samples)."""
+"""Largest number of pixels of the sensor and the margin that the sharpening filter reads, two samples on each
+side. Above it, if a sample is a thousand pixels wide, samples are interpolated by cubics without a filter: 41 to
+50 dB instead of 43 to 45 dB (sharp) and 33 to 39 dB (linear), for cosines of 5.5 samples."""
 ROOM = 1.25
-"""By how much the gap between views may grow where it follows a camera."""
+"""Factor by which the gap between views may grow if it follows a camera."""
 LARGEST_RASTER = 2**28
 """Pixels of the sensor and its margin: 1 GiB for each colour channel."""
 
 
 @dataclass(frozen=True)
 class SharpeningChoices:
-    """How what interpolation takes is given back.
+    """How the loss of sharpness by interpolation is compensated.
 
     Args:
-        wide: whether samples are too wide for it, and are interpolated by cubics instead.
-        along: weights beside the middle of the filters (down, across), where columns and rows part; else None.
+        wide: whether samples are too wide for the filter, and are interpolated by cubics instead.
+        along: weights beside the middle of the filters (down, across), if columns and rows are separable; else
+            None.
         plane: weights beside the middle of the filter of a sheared pixel grid, or None.
     """
 
@@ -52,11 +53,12 @@ class SharpeningChoices:
 
 @dataclass(frozen=True)
 class GapChoices:
-    """Which gaps between taps' pictures are filled.
+    """The gaps between taps' images that are filled.
 
     Args:
-        reach: (down, across) of the tents that fill them, pixels, with room to grow; None: as far as they go.
-        filled: (down, across) which.
+        reach: (down, across) of the tents that fill them, pixels, with room to grow; None: as wide as the tents
+            are.
+        filled: (down, across) whether the gap is filled.
     """
 
     reach: tuple[int, int] | None
@@ -64,7 +66,7 @@ class GapChoices:
 
 
 def choose_gaps(gaps: tuple[float, float], follow: Follow | None = None) -> GapChoices:
-    """Which gaps are filled: those wider than a pixel."""
+    """Choose the gaps to fill: those wider than a pixel."""
     filled = gaps[0] > 1, gaps[1] > 1
     if follow is None:
         return GapChoices(None, filled)
@@ -74,12 +76,12 @@ def choose_gaps(gaps: tuple[float, float], follow: Follow | None = None) -> GapC
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Around(Brief):
-    """What is done around a core.
+    """The operators around a core, and the core.
 
     Args:
-        core: which sharpens samples as it divides them, with the margin that is looked at after it.
+        core: sharpens samples while it divides them; its raster includes the margin that operators read after it.
         before: operators on samples.
-        after: operators on the picture.
+        after: operators on the image.
     """
 
     core: Footprints
@@ -97,16 +99,17 @@ class Around(Brief):
         transmission: Array | None,
         detail: Array | None,
     ) -> Around:
-        """What is done around a core.
+        """The operators around a core, and the core.
 
         Args:
             filters: the core, and the filter that compensates its interpolation.
             sensor: of the camera.
-            tents: which fill gaps between taps' pictures, and from how far they bring in light (`filled`).
-            blurs: what diffusers come to.
-            swapped: whether the pixel axes of samples are.
-            transmission: of masks that multiply the picture, or None.
-            detail: what their variation within pixels does, or None.
+            tents: margin from which tents bring in light, and the tents that fill gaps between taps' images
+                (`filled`).
+            blurs: that replace diffusers.
+            swapped: whether the pixel axes of samples are swapped.
+            transmission: of masks that multiply the image, or None.
+            detail: effect of their variation within pixels, or None.
 
         Raises:
             InputError: a margin around the sensor that is too large.
@@ -137,8 +140,8 @@ class Sharpened(Brief):
     """A core, and the filter of the image that compensates its interpolation (`vcc.plan.sharpening`).
 
     Args:
-        core: which filters samples as it divides them.
-        along: (down, across) where columns and rows part, or None.
+        core: filters samples while it divides them.
+        along: (down, across) if columns and rows are separable, or None.
         plane: the filter of a sheared pixel grid, odd rows × odd columns, or None.
     """
 
@@ -148,14 +151,14 @@ class Sharpened(Brief):
 
     @property
     def reach(self) -> int:
-        """Pixels beyond the border that it looks at."""
+        """Pixels beyond the border that the filter reads."""
         if self.along is not None:
             return max(len(weights) for weights in self.along) // 2
         return 0 if self.plane is None else max(self.plane.shape) // 2
 
     @classmethod
     def choose(cls, core: Footprints, sample: Sample) -> SharpeningChoices:
-        """How what linear interpolation takes is given back; see `of`."""
+        """Choose how the loss by linear interpolation is compensated; see `of`."""
         losses, core = _sharpening(core, sample)
         step = core.step / core.refine
         (xk, xl), (yk, yl) = step
@@ -172,12 +175,13 @@ class Sharpened(Brief):
     def of(cls, core: Footprints, sample: Sample, choices: SharpeningChoices) -> Sharpened:
         """The filter that compensates linear interpolation.
 
-        Where samples are divided because a mask is finer than they are, they are filtered as they are divided,
-        before the mask; the picture then lacks only what its finer samples lost, each a mean over its own cell.
+        If samples are divided because a mask is finer than they are, they are filtered while they are divided,
+        before the mask. The image filter then compensates only the loss of the finer samples, each a mean over
+        its own cell.
 
         Args:
             core: footprints.
-            sample: what samples are.
+            sample: "point" or "mean".
             choices: how.
         """
         losses, core = _sharpening(core, sample)
@@ -188,8 +192,8 @@ class Sharpened(Brief):
         if choices.along is not None:
             spline, (down, across) = core.interpolation == "spline", choices.along
             return cls(core, (along_axis(losses, yl, spline, down), along_axis(losses, xk, spline, across)))
-        # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; a pixel's
-        # mean is taken along the columns, too.
+        # Light is spread along the samples' columns on the sensor, and across at fixed rows of pixels; the mean
+        # over a pixel is taken along the columns, too.
         assert choices.plane is not None
         footprint = BOX if core.interpolation == "box" else TENT
         shear = xl / yl
@@ -201,7 +205,7 @@ class Sharpened(Brief):
 
 
 def _sharpening(core: Footprints, sample: Sample) -> tuple[float, Footprints]:
-    """The powers of sinc that the picture lacks, and the core, which sharpens samples as it divides them."""
+    """The powers of sinc that the image has lost, and the core, which sharpens samples while it divides them."""
     losses = TENT + (MEAN if sample == "mean" else 0)
     if core.refine > 1:
         core = replace(core, sharpen_samples=along_axis(losses, 1.0))
@@ -210,9 +214,10 @@ def _sharpening(core: Footprints, sample: Sample) -> tuple[float, Footprints]:
 
 
 def choose_sharp_footprint(step: Array, divided: SampleDivision) -> str:
-    """The footprint that is sharpened: a tent, which is quick; a spline where pixels would see a tent's bends.
+    """Choose the footprint that is sharpened: a tent, which is fast, or a spline if pixels resolve the tent's
+    kinks.
 
-    Behind hard edges samples that are divided fill their own cells, for the mask cuts them off there.
+    Behind hard edges, divided samples fill their own cells, because the mask cuts them off there.
     """
     if divided.parts > 1:
         return "box" if divided.hard else "linear"
@@ -224,17 +229,17 @@ def choose_sharp_footprint(step: Array, divided: SampleDivision) -> str:
 def filled(
     gaps: tuple[float, float], choices: GapChoices, sensor_shape: tuple[int, int]
 ) -> tuple[int, AlongAxes | None]:
-    """The margin from which tents that fill gaps between taps' pictures bring in light, and the tents.
+    """The margin from which tents that fill gaps between taps' images bring in light, and the tents.
 
     Args:
         gaps: (vertical, horizontal), pixels.
-        choices: which of them are filled.
+        choices: the gaps to fill.
         sensor_shape: (rows, columns).
 
     Raises:
         InputError: a margin that is too large, or gaps that have grown too far.
     """
-    _check_raster(sensor_shape, math.ceil(max(gaps)))  # before so many weights are made
+    _check_raster(sensor_shape, math.ceil(max(gaps)))  # before large filters are made
     if not any(choices.filled):
         return 0, None
     down, across = (gap if so else 0.0 for gap, so in zip(gaps, choices.filled, strict=True))

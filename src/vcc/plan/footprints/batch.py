@@ -1,8 +1,8 @@
-"""Elements in different planes that vary together inside the cell of a view: what it costs to take them apart.
+"""Elements in different planes that vary together inside a view's cell: the error of averaging them separately.
 
-The mean of a product is not the product of the means. How far they differ is found by looking: at some places of
-the sensor, and through each of these at some places of the aperture, elements are looked at in points all over a
-cell. The places follow from the optics alone, so that a piece of a light field is treated as the whole is.
+The mean of a product is not the product of the means. The difference is estimated by sampling: at some places of
+the sensor, and for each at some places of the aperture, the elements are evaluated at points all over a cell. The
+places follow from the optics alone, so that a piece of a light field is treated like the whole.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from vcc.plan.footprints.planes import Plane
 Array = NDArray[np.float64]
 
 PIXELS, RAYS, POINTS = 3, 32, 8
-"""Places of the sensor, of the aperture behind each, and points each way across a cell; besides mirror images."""
+"""Places of the sensor, of the aperture for each, and points each way across a cell; mirror images not counted."""
 HALVED = (0.25, 0.5)
-"""By how much the error falls at least, and at most, where cells are divided once more."""
+"""Smallest and largest factor by which the error falls if cells are divided once more."""
 LARGEST = 100
-"""Times the grid of views: what is larger does not bound the light."""
+"""Times the area of the grid of views: larger planes do not bound the light."""
 
 
 class _Map(NamedTuple):
@@ -37,12 +37,12 @@ class _Map(NamedTuple):
 
 
 class Apart(NamedTuple):
-    """What it costs to take elements apart that vary together.
+    """The cost of averaging elements separately that vary together.
 
     Args:
-        error: by which a picture errs where cells are divided into so many parts each way, a share of its light.
-        share: of the rays, of those in whose cells several elements vary.
-        even: which groups let the same light pass wherever they are looked at.
+        error: error of the image if cells are divided into so many parts each way, a share of its light.
+        share: of the rays in whose cells several elements vary.
+        even: for each group, whether it transmits the same light at all sampled places.
     """
 
     error: Callable[[int], float]
@@ -52,13 +52,13 @@ class Apart(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Looks(Brief):
-    """Places at which elements in several planes are looked at.
+    """Places at which elements in several planes are sampled.
 
     Args:
-        groups: planes that stand together, and tell views apart only: the first of these, if any; then one each.
-        at_views: whether the first group is at the views: where its open part is in a cell is then known, and what
-            others do there linearly.
-        places: on each plane of each group, in points of cells, (pixels, rays, points, points, 2), metres from the
+        groups: first the planes at the views, as one group, if there are any; then one group for each other plane.
+        at_views: whether the first group is at the views: then the place of its open part in a cell is known, and
+            other elements are approximated linearly across the cell.
+        places: on each plane of each group, at points of cells, (pixels, rays, points, points, 2), metres from the
             middle of its pattern.
     """
 
@@ -76,11 +76,11 @@ class Looks(Brief):
         sensor: tuple[int, int],
         extent: tuple[float, float],
     ) -> Looks:
-        """Such places for a light field.
+        """Choose such places for a light field.
 
         Args:
             groups: see `Looks`.
-            at_views: likewise.
+            at_views: see `Looks`.
             motion: of the scene that views follow, see `tap_origin`.
             on_sensor: 2×5, places on the sensor from indices (i, j, k, l, 1), pixels.
             sensor: (rows, columns) of pixels.
@@ -115,7 +115,7 @@ class Looks(Brief):
         )
 
     def values(self, number: int) -> Array:
-        """What passes a group in all points of cells, (pixels, rays, points, points)."""
+        """Transmission of a group at all points of cells, (pixels, rays, points, points)."""
         return math.prod(
             (
                 plane.pattern(*np.moveaxis(place, -1, 0))
@@ -125,10 +125,10 @@ class Looks(Brief):
         )
 
     def apart(self, values: list[Array] | None = None) -> Apart:
-        """What taking the elements apart costs.
+        """The cost of averaging the elements separately.
 
         Args:
-            values: of all groups, where not their own: (..., pixels, rays, points, points).
+            values: of all groups, instead of their own: (..., pixels, rays, points, points).
         """
         values = [self.values(n) for n in range(len(self.groups))] if values is None else values
         whole, half = (self._error(values, parts) for parts in (1, 2))
@@ -147,12 +147,12 @@ class Looks(Brief):
         if self.at_views:
             taken = taken + _linear(cut[0], means, cut[1:])
         light, off = float(truth.mean()), (taken - truth).mean(axis=(1, 2, 3))
-        # Light that is too much, or too little, throughout counts twice.
+        # A bias of the same sign everywhere counts twice.
         return max(math.sqrt(float(np.mean(off**2))), 2 * abs(float(off.mean()))) / light if light > 0 else 0.0
 
 
 def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
-    """What others do linearly across parts of cells, to the light in the middle of what the first leaves open."""
+    """Linear part of what other elements do to the light in the middle of the first element's open part."""
     each = first.shape[-1]
     place = (np.arange(each) - (each - 1) / 2) / max(math.sqrt((each**2 - 1) / 12), 1e-300)
     total = np.zeros(means[0].shape)
@@ -166,7 +166,7 @@ def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
 
 
 def _and_mirrored(places: Array) -> Array:
-    """Places (n, …, 2), their mirror images, and all these with x and y exchanged: mirrored cameras are alike."""
+    """Places (n, …, 2), their mirror images, and all with x and y exchanged, so that mirrored cameras agree."""
     signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
     mirrored = np.concatenate([places * sign for sign in signs])
     return np.concatenate([mirrored, mirrored[..., ::-1]])
@@ -183,7 +183,7 @@ def _by_view_and_pixel(plane: Plane, on_sensor: Array) -> _Map:
 
 
 def _views_met(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, extent: tuple[float, float]) -> Array:
-    """Views (i, j), fractions of them too, through which light goes: all over the smallest plane that has a size.
+    """Views (i, j), fractional, through which light passes: places all over the smallest plane of finite size.
 
     Args:
         planes: with the maps to them.

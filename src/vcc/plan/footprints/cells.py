@@ -1,4 +1,4 @@
-"""How the cells of views and samples are divided where masks are finer than they are."""
+"""How cells of views and samples are divided if masks are finer than the cells or samples."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ from vcc.shapes.stacked_patterns import clear_over, dark_over, has_edges
 Array = NDArray[np.float64]
 
 ERROR = 1e-3
-"""Error, as a share of the light, that masks may make within parts of cells and of samples: 60 dB."""
+"""Error, as a share of the light, that masks may cause within parts of cells and of samples: 60 dB."""
 FINE_DETAIL_IN_VIEW = 0.04
-"""Variance of a mask, of its mean squared, that may vanish inside the cell of a view before cells are divided."""
+"""Variance of a mask, over its mean squared, that may be lost inside a view's cell before cells are divided."""
 LARGEST_CHOSEN_DIVISION = 4
-"""Beyond this a plan divides cells of views only when told to: the cost grows with the square."""
+"""A plan divides cells of views further than this only on request: the cost grows with the square."""
 SPILT = 0.25
-"""Of the light that a mask cuts off within a finer sample as wide as a pixel, the share on the wrong one."""
+"""Share of the light cut off by a mask inside a finer sample as wide as a pixel that falls on the wrong pixel."""
 SMOOTH = 43.0
-"""Of what a sharp picture lacks behind a cosine of whose mean squared finer samples lose a share L: of (6L)³/5,
-but for a smaller power, as of several cosines the finest counts most."""
+"""Factor of the error of a sharp image behind a smooth mask. Behind a cosine that loses a share L of its mean
+squared to finer samples, the error is (6L)³/5; the power used is smaller, because the finest of several cosines
+counts most."""
 SHEARED = 1.3
-"""Width of a footprint of rows that are shifted, in widths of the sample, from which on samples are divided."""
+"""Width of the footprint (shifted rows) relative to the width of the sample above which samples are divided."""
 MISPLACED = 0.3
-"""Error of a mask that cuts the cell of a view, as a share of what it cuts off, where the cell's pictures lie a
-pixel apart on the sensor and the shadow of an edge is as wide. Measured on 24 random cameras: 0.04 to 0.13 with
-textures; 0.2 to 0.4 on an even field behind a stop."""
+"""Error of a mask that cuts a view's cell, as a share of the light cut off, if the images of the cell lie one
+pixel apart on the sensor and the shadow of an edge is one pixel wide. Measured on 24 random cameras: 0.04 to
+0.13 with textures; 0.2 to 0.4 on a uniform field behind a stop."""
 
 
 class Detail:
-    """What is found of the detail of patterns, by which cells are divided."""
+    """Detail measured on patterns, which decides how cells are divided."""
 
     def lost(self, plane: Plane, known: Array, added: Array) -> float:
         """See `detail_lost`."""
@@ -54,24 +55,24 @@ class Detail:
 
 
 DETAIL = Detail()
-"""That of the planes' own patterns."""
+"""Detail of the planes' own patterns."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Geometry(Brief):
-    """How samples lie on the sensor: what of a mask the samples of a view meet that reach it.
+    """How samples lie on the sensor, and hence which part of a mask the visible samples of a view meet.
 
     Args:
         views: (rows, columns) of the grid of views.
-        extent: likewise, of the whole of which the light field is a piece.
+        extent: (rows, columns) of the whole grid of views of which the light field is a piece.
         samples: (rows, columns) of a view.
         on_sensor: 2×4, pixels per index step (i, j, k, l).
         origin: where sample (0, 0) of view (0, 0) falls, pixels.
         sensor: (rows, columns) of pixels.
         margin: pixels around the sensor from which light is brought in.
-        parts: of samples, along each axis, that their shape on the sensor asks for, see `parts_of_sheared`.
-        beyond: (before, after) along rows and columns of samples: how many more the light field has there
-            that this is a piece of. All its pieces are divided as the whole is.
+        parts: parts of a sample along each axis that its shape on the sensor requires, see `parts_of_sheared`.
+        beyond: (before, after) along rows and columns of samples: samples that the whole light field has beyond
+            this piece. All pieces are divided as the whole is.
     """
 
     views: tuple[int, int]
@@ -89,7 +90,7 @@ class Geometry(Brief):
 
         Args:
             plane: any.
-            view: (i, j) of the middles of the parts, (rows, columns, 2).
+            view: (i, j) of the centres of the parts, (rows, columns, 2).
             parts: of a view's cell, each way.
         """
         (above, below), (left, right) = self.beyond
@@ -109,7 +110,7 @@ class Geometry(Brief):
         return low, np.maximum(low, high)
 
     def penumbra(self, plane: Plane) -> Array:
-        """Size (x, y) of what of a plane a place of the sensor sees through all views, metres."""
+        """Size (x, y) of the region of a plane that one point of the sensor sees through all views, metres."""
         by_pixel = self._by_pixel(plane)
         by_view = plane.at_index[:, :2]
         if by_pixel is not None:
@@ -117,14 +118,14 @@ class Geometry(Brief):
         return np.asarray(np.abs(by_view) @ np.array(self.extent[::-1]))
 
     def _by_pixel(self, plane: Plane) -> Array | None:
-        """2×2: metres on a plane per pixel of the sensor, within a view; None where a view is one place there."""
+        """2×2: metres on a plane per pixel of the sensor, within a view; None if a view is a point."""
         step = self.on_sensor[:, 2:]
         if abs(np.linalg.det(step)) <= 1e-12 * np.abs(step).max() ** 2:
             return None
         return np.asarray(plane.sample_step @ np.linalg.inv(step))
 
     def varying(self, planes: list[Plane]) -> NDArray[np.bool_]:
-        """In which views any of some planes is neither clear nor dark throughout, (v, u)."""
+        """The views in which any of the planes is neither clear nor dark throughout, (v, u)."""
         rows, columns = self.views
         view = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float64)
         found = np.zeros(self.views, dtype=np.bool_)
@@ -133,7 +134,7 @@ class Geometry(Brief):
         return found
 
     def varying_taps(self, plane: Plane, taps: Taps) -> NDArray[np.bool_]:
-        """In the cells of which taps a plane is neither clear nor dark throughout, (rows, columns)."""
+        """The taps in whose cells a plane is neither clear nor dark throughout, (rows, columns)."""
         found = np.zeros(taps.shares.shape, dtype=np.bool_)
         for mesh, parts in taps.levels():
             found[mesh] = self._varies(plane, (taps.index + taps.shift)[mesh], parts)
@@ -152,19 +153,19 @@ def divide_views(
     refine: int | str,
     detail: Detail = DETAIL,
 ) -> CellDivision:
-    """How views' cells are divided so that fine masks keep their detail.
+    """Choose how views' cells are divided so that fine masks keep their detail.
 
-    Where a cell's picture is spread over more than a pixel, what a mask does inside the cell must fall where it
-    belongs. Elsewhere it adds up in one place, and the mean over the cell says it all for one mask; but the mean
-    of two masks' product is not the product of their means where both vary in the cell. These cells are divided.
+    If the image of a cell spreads over more than a pixel, light must fall where its part of the cell puts it.
+    Otherwise it adds up in one place, and for one mask the mean over the cell is exact. If two masks both vary in
+    the cell, the mean of their product is not the product of their means. Such cells are divided.
 
     Args:
-        view_planes: of masks at the views.
-        path_planes: of those in mid-path.
+        view_planes: masks at the views.
+        path_planes: masks in mid-path.
         between: what is between views.
         geometry: of the samples.
-        refine: "auto", or what was asked for.
-        detail: what is found of the patterns.
+        refine: "auto", or the number requested.
+        detail: detail measured on the patterns.
     """
     if refine == 1:
         return CellDivision(1, False)
@@ -177,7 +178,7 @@ def divide_views(
     spread = parts > 1
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
     apart = Apart(_no_error, 0.0, (False,) * len(groups))
-    if len(groups) > 1:  # even where no view of this piece needs it: all pieces of a light field are divided alike
+    if len(groups) > 1:  # even if no view of this piece needs it: all pieces of a light field are divided alike
         apart = detail.joint_variation(
             Looks.of(
                 groups,
@@ -193,8 +194,8 @@ def divide_views(
     misplaced = max((error for _, error in cut), default=0.0)
 
     def chosen(share: float, left: Callable[[int], float]) -> tuple[int, float]:
-        """The parts of divided cells, which hold a share of the rays, and the error that they leave."""
-        # Where few cells are to be divided, they may be divided further for as many taps.
+        """The number of parts for cells that hold this share of the rays, and the remaining error."""
+        # If few cells are divided, they may be divided further for the same number of taps.
         most = 2 * LARGEST_CHOSEN_DIVISION if 0 < 4 * share <= 1 and not spread else LARGEST_CHOSEN_DIVISION
         most = most if refine == "auto" else max(most, int(refine))
         finer = parts
@@ -205,16 +206,16 @@ def divide_views(
     finer, error = chosen(apart.share, lambda parts: max(apart.error(parts), misplaced))
     if misplaced > ERROR:
         all_cut = chosen(1.0, lambda parts: max(apart.error(parts), misplaced / parts**1.5))
-        if all_cut[1] <= error:  # else few cells divided further leave less
+        if all_cut[1] <= error:  # otherwise dividing few cells further leaves less error
             finer, error = all_cut
             where = where | geometry.varying([plane for plane, error in cut if error > ERROR])
-    if spread:  # a tent reaches over cells that are divided and cells that are not
+    if spread:  # a tent reaches over divided and undivided cells
         return CellDivision(finer, True, error=error)
     return CellDivision(parts, False, finer, where, error)
 
 
 def _where_joint(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:
-    """In which views elements in different planes vary together, (v, u)."""
+    """The views in which elements in different planes vary together, (v, u)."""
     varying = sum((geometry.varying(group).astype(int) for group in groups), np.zeros(geometry.views, dtype=int))
     return np.asarray(varying > 1)
 
@@ -224,9 +225,9 @@ def _no_error(parts: int) -> float:
 
 
 def _misplaced(plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail) -> float:
-    """The error of taking light that passes a part of a view's cell for light from the middle of the cell.
+    """The error of treating light through a part of a view's cell as light through the centre of the cell.
 
-    It falls beside its place on the sensor, where the pictures from all over a cell lie apart.
+    The light falls next to its place on the sensor if the images formed by different parts of the cell lie apart.
     """
     apart = geometry.on_sensor[:, :2] - geometry.on_sensor[:, 2:4] @ between.motion
     pixels = np.abs(geometry.on_sensor[:, 2:4]).sum(axis=1)
@@ -242,11 +243,11 @@ def _cell(plane: Plane, between: BetweenViews) -> Array:
 
 
 def parts_of_sheared(step: Array) -> int:
-    """Into how many parts samples are divided, each way, that lie turned or sheared on the sensor.
+    """The number of parts, each way, into which samples are divided that are rotated or sheared on the sensor.
 
-    The footprint of such a sample is taken as rows that are shifted: wider than the sample by 1 + tan² of the
-    angle by which it is turned. The filter that gives sharpness back then finds other detail than there is. On 7
-    cameras turned by more than 28°: 50.4 and 50.5 dB at worst as one part, 56.6 and 65.2 as two.
+    The footprint of such a sample is approximated by shifted rows: wider than the sample by 1 + tan² of the
+    rotation angle. The sharpening filter then compensates for the wrong detail. On 7 cameras rotated by more
+    than 28°, the worst were 50.4 and 50.5 dB undivided, and 56.6 and 65.2 dB with two parts.
 
     Args:
         step: 2×2, pixels per index step (k, l).
@@ -258,8 +259,8 @@ class SampleDivision(NamedTuple):
     """How samples are divided.
 
     Args:
-        parts: of each, along each axis.
-        error: that is left, a share of the light.
+        parts: of each sample, along each axis.
+        error: remaining, a share of the light.
         hard: whether a mask has edges.
     """
 
@@ -279,22 +280,22 @@ def divide_samples(
     refine: int | str,
     detail: Detail = DETAIL,
 ) -> SampleDivision:
-    """Into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
+    """Choose into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
-    A sample's light lands on the pixels as one footprint, mask and all: detail of the mask that the
-    aperture's penumbra leaves and the footprint would blur needs finer samples. Where that detail is smooth, the
-    filter that gives sharpness back leaves next to none of the error; at hard edges it cannot.
+    The light of a sample, weighted by the mask, lands on the pixels as one footprint. Mask detail that survives
+    the aperture's penumbra but would be blurred by the footprint needs finer samples. The sharpening filter
+    removes nearly all of the error if the detail is smooth; it cannot at hard edges.
 
     Args:
-        planes: of masks in mid-path.
+        planes: masks in mid-path.
         geometry: of the samples.
-        views: how their cells are divided.
-        refine: "auto", or what was asked for.
-        detail: what is found of the patterns.
+        views: how the views' cells are divided.
+        refine: "auto", or the number requested.
+        detail: detail measured on the patterns.
     """
     size = float(np.abs(geometry.on_sensor[:, 2:]).sum(axis=1).max())
 
-    @cache  # of a user's function that is a fifth of a second
+    @cache  # takes a fifth of a second for a user's function
     def left(number: int, parts: int) -> SampleDivision:
         plane = planes[number]
         sample = np.abs(plane.sample_step).sum(axis=1) / parts
@@ -305,7 +306,7 @@ def divide_samples(
 
     if refine == 1 or not planes:
         return SampleDivision(geometry.parts, 0.0, False)
-    # What needs no division loses by it: the filter that gives sharpness back is made for whole samples.
+    # Needless division makes the image worse: the sharpening filter is made for whole samples.
     fine, most = geometry.parts, LARGEST_REFINEMENT if refine == "auto" else max(int(refine), geometry.parts)
     if refine == "auto" and views.finer >= LARGEST_CHOSEN_DIVISION:  # parts of cells times parts of samples cost
         most = LARGEST_CHOSEN_DIVISION

@@ -1,8 +1,8 @@
-"""Plans of cameras that differ in the cells of one mask: one is made, and others or their pictures follow from it.
+"""Plans of cameras that differ in the cells of one mask: the other plans, or the images, follow from one plan.
 
-What the cells of a mask at the views let through decides the weights of views, which of these are looked at, and
-which rays are missing; nothing else in a plan, as long as no mask in mid-path meets light through parts of views'
-cells. Those of a mask in mid-path decide its texture, and how finely cells of views and samples are divided.
+The cells of a mask at the views determine the weights of views, the views that are used and the missing rays, and
+nothing else in a plan if no mask in mid-path meets light through parts of views' cells. The cells of a mask in
+mid-path determine its texture, and how finely cells of views and samples are divided.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ class Codes(Brief):
 
     Args:
         first: the first camera.
-        base: it with all of these cells open.
+        base: the first camera with all of these cells open.
         open: the cells of its mask.
-        cells: those of each camera.
+        cells: of each camera's mask.
         number: of the mask among the elements.
     """
 
@@ -55,7 +55,7 @@ class Codes(Brief):
 
     @classmethod
     def of(cls, trains: Sequence[Train]) -> Codes | None:
-        """What cameras differ in; None where that is anything but the cells of one mask."""
+        """Compare cameras; None if they differ in anything but the cells of one mask."""
         first, found = trains[0], set[int]()
         for train in trains[1:]:
             if train.sensor != first.sensor or len(train.elements) != len(first.elements):
@@ -78,12 +78,12 @@ class Codes(Brief):
         return cls(first, Train(elements, first.sensor), opened, listed, number)
 
     def plans(self, grid: Grid, how: How) -> list[Plan] | None:
-        """The plan of each camera, but for the light it lacks; None where each has to be made by itself."""
+        """The plan of each camera, without its missing light; None if each plan has to be made separately."""
         one = self._at_views(grid, how)
         return None if one is None else [self._plan(one, each) for each in self.cells]
 
     def mixture(self, grid: Grid, how: How) -> Mixture | None:
-        """The pictures of all cameras, or of many, as sums of fewer; None where that is not so."""
+        """The images of all cameras, or of many, as sums of fewer images; None if that is not possible."""
         if not self._folded:
             return None
         one = self._at_views(grid, how)
@@ -105,7 +105,7 @@ class Codes(Brief):
         return all(stage.faces.spread is None and stage.faces.bending is None for stage in self.base.stages)
 
     def _at_views(self, grid: Grid, how: How) -> ByFootprints | None:
-        """The plan from which all follow, with all cells open; None where the mask is not at the views alone."""
+        """The common plan, with all cells open; None if the mask affects more than the weights of views."""
         if not self._folded:
             return None
         one = ByFootprints(self.base, grid, how, Blurs(None, None))
@@ -127,12 +127,12 @@ class Codes(Brief):
     def _weighed(
         self, one: ByFootprints, cells: Cells, shares: Array | None = None
     ) -> tuple[tuple[NDArray[np.intp], ...], Array]:
-        """What some cells leave of the views: an open mesh of the taps that are looked at, and their weights.
+        """The effect of some cells on the views: an open mesh of the used taps, and their weights.
 
         Args:
-            one: the plan from which all follow.
-            cells: in the place of those that are open.
-            shares: what is open of views, where it is known already.
+            one: the common plan.
+            cells: that replace the open ones.
+            shares: open shares of the views, if already computed.
         """
         if shares is None:
             planes = [replace(p, pattern=exchanged(p.pattern, self.open, cells)) for p in one.aperture.planes]
@@ -157,11 +157,11 @@ class Codes(Brief):
 
 
 class _Details:
-    """What is found of the detail of masks that differ in their cells, for all of them at once.
+    """Detail of masks that differ in their cells, computed for all of them in one batch.
 
     Args:
         plane: the mask that differs, with the first of its cells.
-        cells: all of them.
+        cells: of all masks.
     """
 
     def __init__(self, plane: Plane, cells: Sequence[Cells]) -> None:
@@ -169,11 +169,11 @@ class _Details:
         self.found: dict[Any, NDArray[np.float64]] = {}
 
     def of(self, number: int) -> Detail:
-        """That of one of the cameras."""
+        """The detail of one of the cameras."""
         return _OneOfMany(self, number)
 
     def lost(self, plane: Plane, known: Array, added: Array) -> Array:
-        """`detail_lost` of each."""
+        """`detail_lost` of each camera."""
         key = id(plane), *known.tolist(), *added.tolist()
         if key not in self.found:
             own = self.plane.pattern
@@ -204,7 +204,7 @@ class _OneOfMany(Detail):
 
 
 def exchanged(pattern: Pattern, old: Cells, new: Cells) -> Pattern:
-    """A pattern with other cells in the place of some that are a part of it, this very object."""
+    """Replace cells that are a part of a pattern (the same object) by others."""
     if pattern is old:
         return new
     if isinstance(pattern, Product):
@@ -215,7 +215,7 @@ def exchanged(pattern: Pattern, old: Cells, new: Cells) -> Pattern:
 
 
 def _alike(one: Mask, other: object) -> bool:
-    """Whether masks are arrays of as many cells of one size in one place."""
+    """Whether both masks are arrays of equally many cells, of the same size and in the same place."""
     if not (isinstance(other, Mask) and isinstance(one.pattern, Cells) and isinstance(other.pattern, Cells)):
         return False
     mine, others = one.pattern, other.pattern

@@ -1,8 +1,8 @@
-"""From an optical train and a grid to a plan by footprints: linear optics folded, masks pulled to the samples.
+"""Compile an optical train and a grid to a footprint plan: fold linear optics, pull masks to the samples.
 
-This is the paper's strategy (section 4.2) taken further: with every linear element folded into one matrix,
-the place of a sample on the sensor and on each mask is an affine function of its index, and the transform,
-the masks and the projection become one sum.
+This extends the paper's strategy (section 4.2): if every linear element is folded into one matrix, the place of a
+sample on the sensor and on each mask is an affine function of its index, and the transform, the masks and the
+projection become one sum.
 """
 
 from __future__ import annotations
@@ -55,29 +55,29 @@ from vcc.plan.parallax_rule import BetweenViews, choose_between_views
 Array = NDArray[np.float64]
 
 MARGIN = 4
-"""Pixels around the sensor within which footprints and filters look at light."""
+"""Pixels around the sensor from which footprints and filters read light."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FootprintChoices(Brief):
-    """All that is chosen of a plan by footprints, in the order of its stages.
+    """All choices of a footprint plan, in the order of its stages.
 
     Args:
-        on_sensor: how means of masks against the sensor are taken.
+        on_sensor: how means of masks against the sensor are computed.
         landing: how samples are brought to the sensor.
         between: what is between views.
-        absorbing: in which planes masks are taken together.
-        at_views: which planes in mid-path are taken for one weight a view.
+        absorbing: the planes in which masks are combined.
+        at_views: for each plane in mid-path, whether it becomes one weight a view.
         cells: how the cells of views are divided.
-        samples: how samples are.
-        open_cells: how the open shares of taps' cells are found, of each level.
+        samples: how samples are divided.
+        open_cells: how the open shares of taps' cells are computed, for each level.
         taps: rows and columns of taps that are kept.
         varying: taps in whose cells each mask in mid-path varies, (rows, columns).
         textures: of masks in mid-path.
-        footprint: of samples; None: as asked.
-        sharpening: of the picture; None: none.
-        gaps: between taps' pictures.
-        within_pixels: whether masks against the sensor count by their variation within pixels.
+        footprint: of samples; None: as in `How`.
+        sharpening: of the image; None: none.
+        gaps: between taps' images.
+        within_pixels: whether the variation of masks against the sensor within pixels counts.
         kernels: of diffusers.
     """
 
@@ -102,15 +102,15 @@ class FootprintChoices(Brief):
 def blurs_or_why_not(
     train: Train, grid: Grid, how: How, kernels: tuple[KernelChoices, ...] | None = None
 ) -> Blurs | str:
-    """What the diffusers come to where a picture can be made by footprints; else why it cannot, in words.
+    """The blurs that replace the diffusers if footprints can make the image; else the reason why not, as text.
 
-    The words name the element.
+    The text names the element.
 
     Args:
         train: the optics.
         grid: of the light field.
-        how: what was chosen.
-        kernels: what was chosen of those of diffusers, where numbers follow a camera.
+        how: the options.
+        kernels: choices of the diffusers' kernels, if parameters follow a camera.
     """
     for stage in train.stages:
         if stage.faces.bending is not None:
@@ -127,13 +127,13 @@ def blurs_or_why_not(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OpenTaps(Brief):
-    """Taps that masks at the views leave light.
+    """Taps that receive light through the masks at the views.
 
     Args:
-        kept: an open mesh of the rows and columns of taps that are looked at.
-        taps: those.
+        kept: an open mesh of the rows and columns of the taps that are used.
+        taps: these taps.
         weights: of their light.
-        middle: how far the open part of each one's cell lies from the cell's middle, in views, (…, 2).
+        middle: distance of the open part of each tap's cell from the cell's middle, in views, (…, 2).
     """
 
     kept: tuple[NDArray[np.intp], ...]
@@ -143,22 +143,22 @@ class OpenTaps(Brief):
 
 
 class ByFootprints:
-    """The stages of a plan by footprints, each made once of those before it, in this order.
+    """The stages of a footprint plan, each computed once from the stages before it, in this order.
 
-    Stages named ``choose_…`` are the fields of `FootprintChoices`: what was chosen, or else is chosen now. The
+    Stages named ``choose_…`` are the fields of `FootprintChoices`: given by ``choices``, or else chosen now. The
     others compute.
 
     Args:
-        train: the optics, all affine but for ``blurs``.
+        train: the optics, all affine except for ``blurs``.
         grid: of the light field.
-        how: what was chosen.
-        blurs: what the diffusers come to (`blurs_or_why_not`).
-        choices: by which the plan is made; None chooses now.
-        follow: whether its numbers are to follow a camera.
-        parts: what is kept of plans nearby.
+        how: the options.
+        blurs: of the diffusers (`blurs_or_why_not`).
+        choices: for the plan; None chooses now.
+        follow: given if the plan's parameters are to follow a camera.
+        parts: cached parts of nearby plans.
 
     Raises:
-        InputError: a frame that the sensor cannot be reached by, or choices that no longer hold.
+        InputError: a frame from which no light reaches the sensor, or choices that no longer hold.
     """
 
     def __init__(
@@ -180,13 +180,13 @@ class ByFootprints:
 
     @property
     def choices(self) -> FootprintChoices:
-        """All that is chosen."""
+        """All choices."""
         return gathered(FootprintChoices, self)
 
     @property
     @cached
     def plan(self) -> Plan:
-        """How to make the picture."""
+        """The plan that makes the image."""
         around = self.around
         return Plan(
             sensor_shape=self.sensor.shape,
@@ -201,7 +201,7 @@ class ByFootprints:
 
     @property
     def linears(self) -> tuple[Linear, ...]:
-        """Which of its numbers are linear in the cells of masks."""
+        """The parameters of the plan that are linear in the cells of masks."""
         absorbing, textures = self.absorbing, self.textures
         spacings = [made.lattice.spacing for made in textures]
         place = len(self.around.after) - 1
@@ -236,13 +236,13 @@ class ByFootprints:
     @property
     @cached
     def between(self) -> BetweenViews:
-        """The same, as the optics are now."""
+        """What is between views, for the current optics."""
         return self.choose_between.now(self.grid, self.landing.pixels)
 
     @property
     @cached
     def choose_absorbing(self) -> AbsorbingChoices:
-        """In which planes masks are taken together."""
+        """The planes in which masks are combined."""
         return choose_absorbing(self.train, self.landing)
 
     @property
@@ -254,13 +254,13 @@ class ByFootprints:
     @property
     @cached
     def choose_at_views(self) -> tuple[bool, ...]:
-        """Which planes in mid-path are taken for one weight a view."""
+        """For each plane in mid-path, whether it becomes one weight a view."""
         return choose_at_views(self.planes.in_path, self.landing, self.between.motion, self.follow)
 
     @property
     @cached
     def absorbing(self) -> Absorbing:
-        """Planes of masks, by where samples meet them."""
+        """Planes of masks, sorted by where samples meet them."""
         return self.planes.parted(self.landing, self.between.motion, self.choose_at_views)
 
     # --- taps
@@ -308,31 +308,31 @@ class ByFootprints:
     @property
     @cached
     def choose_open_cells(self) -> tuple[CellChoices, ...] | None:
-        """How the open shares of taps' cells are found, of each level; None where nothing has to follow."""
+        """How the open shares of taps' cells are computed, for each level; None if nothing follows a camera."""
         return None if self.follow is None else self._all_taps.choices()
 
     @property
     @cached
     def aperture(self) -> Aperture:
-        """The masks at the views, as all taps meet them, and how their open shares are found."""
+        """The masks at the views, as all taps meet them, and how their open shares are computed."""
         return replace(self._all_taps, chosen=self.choose_open_cells)
 
     @property
     @cached
     def open_parts(self) -> OpenParts:
-        """What is open of each tap's cell."""
+        """The open part of each tap's cell."""
         return self.aperture.open_parts(self.parts)
 
     @property
     @cached
     def choose_taps(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows and columns of taps that are looked at."""
+        """Rows and columns of taps that are used."""
         return choose_taps(self.aperture.taps.shares * self.open_parts.weights, self.follow)
 
     @property
     @cached
     def open_taps(self) -> OpenTaps:
-        """Those taps, and their light."""
+        """The taps that are used, and their light."""
         taps, parts = self.aperture.taps, self.open_parts
         kept = np.ix_(*self.choose_taps)
         weights = (taps.shares * parts.weights)[kept]
@@ -343,9 +343,9 @@ class ByFootprints:
     @property
     @cached
     def choose_varying(self) -> tuple[NDArray[np.bool_], ...]:
-        """Taps in whose cells each mask varies: elsewhere it does not matter which part of one is open.
+        """Taps in whose cells each mask varies; in other cells the place of the open part does not matter.
 
-        Moved to the middle of the open part, a cell would reach over an edge that does not cross it.
+        There, a cell moved to the middle of the open part would overlap an edge that does not cross the cell.
         """
         geometry, taps = self.geometry, self.open_taps.taps
         return tuple(geometry.varying_taps(plane, taps) for plane in self.absorbing.in_path)
@@ -365,19 +365,19 @@ class ByFootprints:
     @property
     @cached
     def choose_textures(self) -> tuple[TextureChoices, ...]:
-        """How their textures are made."""
+        """How the textures of the masks are made."""
         return tuple(met.choices(self.follow) for met in self.masks_met)
 
     @property
     @cached
     def looked_up(self) -> tuple[tuple[MaskLookup, Textured], ...]:
-        """Their textures, and what is needed to make others like them."""
+        """The textures of the masks, and how each was made."""
         pairs = zip(self.masks_met, self.choose_textures, strict=True)
         return tuple(met.look_up(choices, self.parts) for met, choices in pairs)
 
     @property
     def textures(self) -> tuple[Textured, ...]:
-        """How their textures were made."""
+        """How the textures of the masks were made."""
         return tuple(made for _, made in self.looked_up)
 
     # --- the core, and what is done around it
@@ -385,13 +385,13 @@ class ByFootprints:
     @property
     @cached
     def choose_footprint(self) -> str | None:
-        """The footprint of samples; None: as asked."""
+        """The footprint of samples; None: as in `How`."""
         return choose_sharp_footprint(self.landing.step, self.choose_samples) if self.sharp else None
 
     @property
     @cached
     def core(self) -> Footprints:
-        """The footprints, before what is done around them."""
+        """The footprints, without the operators before and after them."""
         landing, taps = self.landing, self.open_taps.taps
         place = tap_origin(landing.pixels, landing.origin, taps.index, taps.shift, self.between.motion)
         return Footprints(
@@ -413,31 +413,31 @@ class ByFootprints:
     @property
     @cached
     def choose_sharpening(self) -> SharpeningChoices | None:
-        """How what interpolation takes from sharpness is given back; None: not at all."""
+        """How the loss of sharpness by interpolation is compensated; None: not at all."""
         return Sharpened.choose(self.core, self.grid.sample) if self.sharp else None
 
     @property
     def gaps(self) -> tuple[float, float]:
-        """(vertical, horizontal) between taps' pictures, pixels."""
+        """(vertical, horizontal) between taps' images, pixels."""
         down, across = (gap / self.choose_cells.parts for gap in self.between.gap_filled)
         return down, across
 
     @property
     @cached
     def choose_gaps(self) -> GapChoices:
-        """Which of them are filled."""
+        """The gaps that are filled."""
         return choose_gaps(self.gaps, self.follow)
 
     @property
     @cached
     def choose_on_sensor(self) -> MeansOnSensor | None:
-        """How means of masks against the sensor are taken; None: by patterns themselves."""
+        """How means of masks against the sensor are computed; None: by the patterns' own `mean`."""
         return None if self.follow is None else choose_means(self.sensor, self.absorbing.against_sensor)
 
     @property
     @cached
     def within_pixels(self) -> Array | None:
-        """What the variation of masks against the sensor within pixels does; None without."""
+        """Effect of the variation of masks against the sensor within pixels; None without."""
         if not self.sharp:
             return None
         planes = self.absorbing.against_sensor
@@ -446,19 +446,19 @@ class ByFootprints:
     @property
     @cached
     def choose_within_pixels(self) -> bool:
-        """Whether it counts."""
+        """Whether this variation counts."""
         return against_sensor.counts(self.within_pixels)
 
     @property
     @cached
     def choose_kernels(self) -> tuple[KernelChoices, ...]:
-        """Of the diffusers that ``blurs`` stands for."""
+        """Choices of the diffusers' kernels that ``blurs`` replaces."""
         return choose_kernels(self.train, self.light_field, self.sharp)
 
     @property
     @cached
     def around(self) -> Around:
-        """What is done before and after the footprints."""
+        """The operators before and after the footprints."""
         choices, planes = self.choose_sharpening, self.absorbing.against_sensor
         filters = Sharpened(self.core) if choices is None else Sharpened.of(self.core, self.grid.sample, choices)
         return Around.of(
@@ -471,11 +471,11 @@ class ByFootprints:
             self.within_pixels if self.choose_within_pixels else None,
         )
 
-    # --- words
+    # --- text
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the plan does, in words."""
+        """What the plan does, as text."""
         cells, samples, absorbing = self.choose_cells, self.choose_samples, self.absorbing
         of_masks = "as asked" if self.how.refine != "auto" else "a mask near the sensor is finer than a sample"
         turned = samples.parts == self.geometry.parts
@@ -487,23 +487,23 @@ class ByFootprints:
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """What the plan cautions of, in words."""
+        """Warnings of the plan, as text."""
         ghosts = 0.0 if self.how.between_views == "none" else self.between.gap_left
         pixel = max(1.0, abs(self.core.row_step))
         cautions = cautions_of(self.choose_cells, self.choose_samples, ghosts, pixel)
         return cautions + coarse_textures(self.core.masks)
 
-    # --- for pictures of other masks
+    # --- for images with other masks
 
     @property
     def open_aperture(self) -> Aperture:
-        """The masks at the views, as those taps meet them that are looked at."""
+        """The masks at the views, as the used taps meet them."""
         return replace(self.aperture, taps=self.open_taps.taps)
 
     @property
     def alone(self) -> bool:
-        """Whether nothing in the plan but taps' weights depends on what masks at the views let through."""
-        # Gaps between views' pictures that are filled ask for parts of cells where a mask is fine.
+        """Whether the transmission of masks at the views affects nothing in the plan but the weights of taps."""
+        # If gaps between views' images are filled, cells are divided where a mask is fine.
         return not self.absorbing.in_path and (self.how.refine == 1 or max(self.between.gap_filled) <= 1)
 
     def same_by(self, detail: Detail) -> bool:
@@ -515,9 +515,9 @@ class ByFootprints:
 
 
 def choose_taps(weights: Array, follow: Follow | None = None) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of taps that are looked at: that give light, or the first where none does.
+    """Rows and columns of taps to use: those with light, or the first if none has any.
 
-    All where numbers follow a camera, since what is dark may be lit later.
+    All taps if parameters follow a camera, because dark taps may be lit later.
     """
     if follow is not None:
         rows, columns = map(np.arange, weights.shape)

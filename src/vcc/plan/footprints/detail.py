@@ -1,4 +1,4 @@
-"""How much of a pattern's detail averaging takes away."""
+"""Loss of a pattern's detail by averaging."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from vcc.shapes.stacked_patterns import Product, product_of_means
 Array = NDArray[np.float64]
 
 POINTS = 512
-"""Along each side of a pattern, in which it is looked at."""
+"""Points along each side at which a pattern is sampled."""
 PATCHES = 8
-"""Along a side of a pattern that is finer than so many points show: it is looked at in parts of it."""
+"""Patches along a side of a pattern that is too fine for so many points: only these parts of it are sampled."""
 ARRAYS_AT_ONCE = 64
-"""Arrays of cells that are looked at together."""
+"""Arrays of cells that are processed in one batch."""
 
 
 def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: float) -> Array:
-    """Means over cells so fine that two edges hardly share one: of a product, the product of means."""
+    """Means over cells so fine that hardly any has two edges: the mean of a product is the product of means."""
     if isinstance(pattern, Product) and len(pattern.factors) > 1:
         return product_of_means(pattern.factors, x, y, width, height)
     return pattern.mean(x, y, width, height)
 
 
 def _means_around(values: Array, length: float) -> Array:
-    """Means over so many rows, 1 or more, around each row; zeros beyond the first and the last."""
+    """Means over ``length`` rows, 1 or more, around each row; zeros beyond the first and the last."""
     if length == 1:
         return values
     rows, whole = len(values), int((length - 1) / 2)
-    cut = (length - 1) / 2 - whole  # what counts of the rows at the ends
+    cut = (length - 1) / 2 - whole  # weight of the rows at the ends
     padded = np.zeros((rows + 2 * whole + 2, *values.shape[1:]))
     padded[whole + 1 : whole + 1 + rows] = values
     means = padded[:rows] + padded[2 * whole + 2 :]
     means *= cut
     for above, sums in pairwise(padded):
-        sums += above  # NumPy's own running sums go down column by column, which takes several times as long
+        sums += above  # NumPy's cumsum runs down column by column, which is several times slower
     means += padded[2 * whole + 1 : -1]
     means -= padded[:rows]
     means /= length
@@ -48,14 +48,14 @@ def _means_around(values: Array, length: float) -> Array:
 
 
 def detail_lost(plane: Plane, known: Array, added: Array) -> float:
-    """The variance that averaging a pattern over ``added`` takes away after ``known``, of its mean squared.
+    """The variance lost if a pattern is averaged over ``added`` after ``known``, relative to its mean squared.
 
-    Its root is the error that a pattern makes where what it does within ``added`` is not told apart.
+    Its root is the error of a pattern whose variation within ``added`` is not resolved.
 
     Args:
         plane: of the pattern.
-        known: size (x, y) of the rectangle that the pattern is averaged over anyway, metres.
-        added: of that by which it is averaged besides.
+        known: size (x, y) of the rectangle that the pattern is averaged over in any case, metres.
+        added: size of the rectangle of the additional averaging.
     """
 
     def looked_at(x: Array, y: Array, cell: tuple[float, float]) -> Array:
@@ -65,7 +65,7 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
 
 
 def details_lost(cells: Cells, values: Array, known: Array, added: Array) -> Array:
-    """`detail_lost` of each of several arrays, (arrays, rows, columns), in the place of an array of cells."""
+    """`detail_lost` for each of several arrays, (arrays, rows, columns), in place of an array of cells."""
 
     def of_some(some: Array) -> Array:
         return _details_lost(cells.size, lambda x, y, cell: cells.means(some, x, y, *cell), known, added)
@@ -79,7 +79,7 @@ def _details_lost(
     known: Array,
     added: Array,
 ) -> Array:
-    """`detail_lost` of patterns of one size; ``looked_at`` finds means over small cells, (patterns, y, x)."""
+    """`detail_lost` for patterns of one size; ``looked_at`` computes means over small cells, (patterns, y, x)."""
     if (added <= 0).all():
         return np.zeros(len(looked_at(np.zeros(1), np.zeros(1), (1.0, 1.0))))
     bounded = np.isfinite(size_of_pattern)
@@ -95,7 +95,7 @@ def _details_lost(
         (middle[:, None] + ((np.arange(count) + 0.5) / count - 0.5) * side).ravel()
         for middle, count, side in zip(middles, counts, size, strict=True)
     )
-    # Averaged once as finely as it is looked at, and these means averaged further.
+    # Averaged once over the finest cells; these means are then averaged further.
     values = looked_at(x, y, (float(cell[0]), float(cell[1])))
     light = values.mean(axis=(1, 2))
     each = len(values)
@@ -103,12 +103,12 @@ def _details_lost(
     values = values.reshape(-1, counts[1], counts[0])
     even = values.var(axis=(1, 2)) < 1e-12
     by_row = np.clip(values, 0.0, 1.0).transpose(1, 0, 2)
-    # A pattern without bounds goes on beyond what is looked at: only what lies within is compared.
+    # An unbounded pattern continues beyond the sampled region: only the interior is compared.
     reach = np.ceil(np.where(bounded, 0.0, np.hypot(known, added) / 2 / cell)).astype(int)
     across, down = (slice(n, max(count - n, n + 1)) for n, count in zip(reach, counts, strict=True))
 
     def variance(box: Array) -> Array:
-        # What is twice as wide as the pattern holds all of it wherever it lies: what is wider has less on average.
+        # A box twice as wide as the pattern contains all of it wherever it lies; a wider box has a lower mean.
         wide, high = np.clip(box, cell, 2 * size) / cell
         share = float(np.prod(np.minimum(1.0, 2 * size / np.maximum(box, cell))))
         down_done = _means_around(by_row, float(high))[down]
@@ -121,6 +121,6 @@ def _details_lost(
 
 
 def _middles_of_patches(side: float, number: int) -> Array:
-    """Of one in each of so many equal parts of a side, anywhere in its part, so that no period is met alike."""
+    """Centres of patches, one at a random place in each equal part of a side, so that no period is favoured."""
     within = np.random.default_rng(0).random(number) if number > 1 else np.full(1, 0.5)
     return np.asarray(((np.arange(number) + within) / number - 0.5) * side)

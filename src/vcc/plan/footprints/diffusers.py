@@ -1,18 +1,18 @@
-"""Rewrite rules for diffusers: when scattering is a blur of the picture, or of each view.
+"""Rewrite rules for diffusers: conditions under which scattering is a blur of the image, or of each view.
 
-Rule 1, blur of the picture. A uniform diffuser changes a ray's slope by δ with density D(δ), wherever the ray
-meets it. If all optics behind it are affine, the ray lands B·δ further, for every ray alike, with B the place
-on the sensor from slope at the diffuser. So the picture is convolved with D, stretched by B. Preconditions: the
-kernel is uniform; behind the diffuser's plane nothing bends rays other than affinely, nothing absorbs (a rim or
-a mask there would be met in another place by the scattered ray), and whatever else scatters is uniform too.
-What stands in the diffuser's own plane acts by position, which scattering leaves alone, and may absorb.
+Rule 1, blur of the image. A uniform diffuser changes a ray's slope by δ with density D(δ), wherever the ray
+meets it. If all optics behind it are affine, every ray lands B·δ further, with B the derivative of the place
+on the sensor to the slope at the diffuser. So the image is convolved with D, stretched by B. Preconditions: the
+kernel is uniform; behind the diffuser's plane nothing bends rays other than affinely, nothing absorbs (the
+scattered ray would meet a rim or a mask there in another place), and all other diffusers are uniform too.
+Elements in the diffuser's own plane act by position, which scattering does not change, and may absorb.
 
 Rule 2, blur of the views. If all optics before a uniform diffuser are affine and each view meets it in one
-place, then scattering exchanges light between the pixels of one view only: each view's picture is convolved
+place, scattering exchanges light only between the pixels of one view: each view's image is convolved
 with D. Preconditions: the kernel is uniform; up to the diffuser's plane nothing bends rays other than affinely,
-and what absorbs there tells views apart only.
+and each view meets all that absorbs there in one place.
 
-Where neither holds, rays are traced.
+If neither rule holds, rays are traced.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from vcc.shapes.stacked_patterns import clear_over
 Array = NDArray[np.float64]
 
 ROOM = 1.25
-"""By how much a kernel may grow where it follows a camera."""
+"""Factor by which a kernel may grow if it follows a camera."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Blurs(Brief):
-    """What the diffusers of a camera come to.
+    """The blurs that replace the diffusers of a camera.
 
     Args:
-        picture: kernel in pixels that the picture is convolved with, odd rows × odd columns of sum 1, or None.
+        picture: kernel in pixels that the image is convolved with, odd rows × odd columns of sum 1, or None.
         views: kernel in samples that each view is convolved with, likewise, or None.
-        notes: which rule was applied to what, in words.
+        notes: the rule applied to each diffuser, as text.
     """
 
     picture: Array | None
@@ -56,12 +56,12 @@ class Blurs(Brief):
 
 @dataclass(frozen=True)
 class KernelChoices:
-    """What is chosen of a kernel on a lattice so that it follows a camera.
+    """Choices for a kernel on a lattice so that it follows a camera.
 
     Args:
         axes: that the kernel lies along (`vcc.shapes.kernel_weights.axes_of`).
         steps_beside: (rows, columns) of steps on each side of its middle, with room to grow.
-        filters: weights on each side of the middle, (down, across), of those that compensate sharing out.
+        filters: weights on each side of the middle of filters that compensate the distribution, (down, across).
     """
 
     axes: Hashable = choice("axes that the kernel lies along")
@@ -71,7 +71,7 @@ class KernelChoices:
 
 @dataclass(frozen=True, eq=False)
 class _Scattered:
-    """A diffuser as a blur: its kernel, steps from slopes (2×2), whether it blurs views, and that in words."""
+    """A diffuser as a blur: its kernel, steps from slopes (2×2), whether it blurs views, and a note as text."""
 
     label: str
     kernel: Kernel
@@ -83,13 +83,13 @@ class _Scattered:
 def diffusers_as_blurs(
     train: Train, grid: Grid, sharp: bool = True, choices: tuple[KernelChoices, ...] | None = None
 ) -> Blurs | str:
-    """The blurs by which the rules replace all diffusers of a camera, or why they do not.
+    """The blurs by which the rules replace all diffusers of a camera, or the reason why they cannot.
 
     Args:
         train: with diffusers or without.
-        grid: that it looks at.
-        sharp: whether the tent by which a kernel is shared out on its lattice is given back.
-        choices: of each kernel, where numbers follow a camera.
+        grid: of the light field.
+        sharp: whether to compensate for the tent that distributes a kernel over its lattice.
+        choices: for each kernel, if parameters follow a camera.
 
     Raises:
         InputError: kernels for which the choices no longer hold.
@@ -112,14 +112,14 @@ def diffusers_as_blurs(
 
 
 def choose_kernels(train: Train, grid: Grid, sharp: bool) -> tuple[KernelChoices, ...]:
-    """What is chosen of the kernels of diffusers that are blurs, so that they follow a camera."""
+    """Choose the lattices of diffusers that are blurs, so that their kernels follow a camera."""
     found = _scattered(train, grid)
     assert not isinstance(found, str)
     return tuple(_choose_kernel(each.kernel, each.steps_from_slopes, sharp) for each in found)
 
 
 def _scattered(train: Train, grid: Grid) -> list[_Scattered] | str:
-    """The diffusers of a camera as blurs, or why one of them is none."""
+    """The diffusers of a camera as blurs, or the reason why one of them is not a blur."""
     found: list[_Scattered] = []
     for n, stage in enumerate(train.stages):
         if stage.faces.spread is None:
@@ -141,9 +141,9 @@ def _scattered(train: Train, grid: Grid) -> list[_Scattered] | str:
 
 
 def behind(train: Train, n: int, grid: Grid) -> str | None:
-    """What forbids rule 1 for the diffuser that is stage n, in words; None if nothing does.
+    """The obstacle to rule 1 for the diffuser that is stage n, as text; None if there is none.
 
-    A stop or a mask that lets all light of the light field pass, scattered as far as it may be, forbids nothing.
+    A stop or a mask is no obstacle if all light of the light field passes it even after the widest scattering.
     """
     same_plane = True
     for stage in train.stages[n + 1 :]:
@@ -209,7 +209,7 @@ def _samples_from_slopes(train: Train, grid: Grid, n: int) -> Array:
 def _on_lattice(
     kernel: Kernel, steps_from_slopes: Array, sharp: bool, choices: KernelChoices | None = None
 ) -> Array:
-    """A kernel's weights; ``sharp``, without what they spread by sharing out what falls between lattice points.
+    """A kernel's weights on its lattice; ``sharp`` compensates for the blur of distributing it to lattice points.
 
     Raises:
         InputError: a kernel that reaches too far, or for which the choices no longer hold.
@@ -239,10 +239,10 @@ def _choose_kernel(kernel: Kernel, steps_from_slopes: Array, sharp: bool) -> Ker
 
 
 def _losses(kernel: Kernel, steps_from_slopes: Array, weights: Array) -> list[float]:
-    """What sharing a kernel out on its lattice takes, along x and y, as a power of sinc.
+    """The blur of distributing a kernel over its lattice, along x and y, as a power of sinc.
 
-    Along an axis that adds E|δ| − E δ² steps² to the variance of a kernel narrower than a step, and 1/6 to that of
-    a wide one, as much as sinc² takes.
+    Along an axis, the distribution adds E|δ| − E δ² steps² to the variance of a kernel narrower than a step, and
+    1/6 to the variance of a wide one, as much as sinc² does.
     """
     slopes, shares = kernel.quadrature()
     places = slopes @ steps_from_slopes.T
@@ -257,9 +257,10 @@ def _losses(kernel: Kernel, steps_from_slopes: Array, weights: Array) -> list[fl
 
 
 def _filtered(weights: Array, along: Array, axis: int) -> Array:
-    """Weights convolved along one axis with an odd number of weights, and as many but one more of them there.
+    """Weights convolved along one axis with an odd number of weights, which lengthens them by this number less
+    one.
 
-    One axis after the other: a wide kernel has millions of weights.
+    Each axis is filtered separately: a wide kernel has millions of weights.
     """
     from scipy.ndimage import convolve1d
 

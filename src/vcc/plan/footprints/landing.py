@@ -1,4 +1,4 @@
-"""Where the samples of a light field fall on the sensor: affine in their indices."""
+"""Places of the samples of a light field on the sensor: affine in their indices."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class LandingChoices:
     """How samples are brought to the sensor.
 
     Args:
-        swapped: whether pixel axes are taken in the other order than the light field's.
-        straight: of the steps across (x from l, y from k), which are rounding.
+        swapped: whether the order of the pixel axes is swapped relative to the light field.
+        straight: which of the cross steps (x from l, y from k) are rounding.
         points: along (x, y), whether views fall into points.
     """
 
@@ -34,7 +34,7 @@ class LandingChoices:
 
 
 def choose_landing(train: Train, grid: Grid) -> LandingChoices:
-    """How samples are best brought to the sensor."""
+    """Choose how samples are brought to the sensor."""
     down = (train.arriving_at_sensor @ grid.frame).linear[1]
     swapped = bool(abs(down[3]) < abs(down[2]))
     found = _Places.of(train, grid, swapped)
@@ -44,7 +44,7 @@ def choose_landing(train: Train, grid: Grid) -> LandingChoices:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Places(Brief):
-    """Places of samples, their pixel axes in one order or the other; see `Landing`."""
+    """Places of samples for one order of the pixel axes; see `Landing`."""
 
     frame: Affine
     samples: tuple[int, int]
@@ -64,18 +64,18 @@ class _Places(Brief):
 
     @property
     def crossing(self) -> Array:
-        """By how many pixels a view leaves its row along x, and its column along y, at most."""
+        """Largest deviation of a view from its row along x, and from its column along y, pixels."""
         return np.asarray(np.abs(self.pixels[[0, 1], [3, 2]]) * max(self.samples))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Landing(Brief):
-    """Where samples fall on the sensor.
+    """Places of samples on the sensor.
 
     Args:
         frame: of the light field, its pixel axes in the order in which rows of samples land on rows of the sensor.
         samples: (rows, columns) of a view in that order.
-        swapped: whether that is the other order than the light field's.
+        swapped: whether this order differs from the light field's.
         metres: 2×5, places (x, y) on the sensor's plane from indices (i, j, k, l, 1).
         pixels: 2×4, pixels of the sensor per index step (i, j, k, l).
         origin: where sample (0, 0) of view (0, 0) falls, pixels.
@@ -92,10 +92,10 @@ class Landing(Brief):
 
     @classmethod
     def of(cls, train: Train, grid: Grid, choices: LandingChoices) -> Landing:
-        """Where a train brings the samples of a grid.
+        """The places on the sensor to which a train brings the samples of a grid.
 
         Raises:
-            InputError: rows of samples no longer land where it was chosen that they do.
+            InputError: rows of samples no longer land as chosen.
         """
         found = _Places.of(train, grid, choices.swapped)
         step = _cleaned(found.pixels[:, 2:], found.crossing, choices)
@@ -103,7 +103,7 @@ class Landing(Brief):
 
 
 def _cleaned(step: Array, crossing: Array, choices: LandingChoices) -> Array:
-    """Steps without cross terms that are rounding errors, and without zeros on the way to the pixels.
+    """Steps with rounding errors in cross terms set to zero, and zeros along the axes replaced.
 
     Args:
         step: 2×2, pixels per index step (k, l).

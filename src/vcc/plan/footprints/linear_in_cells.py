@@ -1,6 +1,6 @@
-"""Which numbers of a plan by footprints are linear in the cells of masks, and the transposes of these maps.
+"""Parameters of a footprint plan that are linear in the cells of masks, and the transposes of these maps.
 
-Those of masks in mid-path stand beside their textures (`vcc.plan.footprints.mask_textures`).
+The maps of masks in mid-path are defined next to their textures (`vcc.plan.footprints.mask_textures`).
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ Array = NDArray[np.float64]
 
 
 def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane], spacings: list[Array]) -> Linear:
-    """How taps' weights, and where they meet masks in mid-path, follow the cells of masks at the views.
+    """The map from cells of masks at the views to taps' weights and places on masks in mid-path.
 
     Args:
-        aperture: these masks.
-        keep: which of the taps there are.
-        path_planes: the masks in mid-path: light through a part of a tap's cell meets them around its middle.
+        aperture: the masks at the views.
+        keep: which taps are kept.
+        path_planes: the masks in mid-path, met by light through a part of a tap's cell around the middle of that
+            part.
         spacings: (x, y) of the points of their textures, metres.
     """
 
@@ -54,13 +55,13 @@ def by_view_planes(aperture: Aperture, keep: Any, path_planes: list[Plane], spac
 def by_masks_against_sensor(
     sensor: Sensor, planes: list[Plane], means: MeansOnSensor, place: int, detailed: bool
 ) -> Linear:
-    """How what the picture is multiplied by follows the cells of masks against the sensor.
+    """The map from cells of masks against the sensor to the factors of the image.
 
     Args:
         sensor: of the camera.
         planes: the masks against it.
-        means: how theirs are taken.
-        place: of what applies them among what is done after the core.
+        means: how their means are computed.
+        place: index in ``plan.after`` of the operator that applies them.
         detailed: whether their variation within pixels counts.
     """
 

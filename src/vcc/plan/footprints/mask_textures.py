@@ -1,4 +1,4 @@
-"""Masks as textures of what samples average of them, and how well textures show it."""
+"""Textures of masks, averaged over the footprints of samples, and the error of looking them up."""
 
 from __future__ import annotations
 
@@ -23,46 +23,46 @@ from vcc.shapes.patterns import Cells, Pattern
 
 Array = NDArray[np.float64]
 Means = tuple[tuple[MeanChoice | None, ...], ...]
-"""How means are taken, by level, and by rows that are averaged at once."""
+"""How means are computed, by level, and by blocks of rows that are averaged at once."""
 
 TEXTURE_POINTS_PER_FOOTPRINT = 3
-"""Weights are quadratic B-splines of texture points this fine; what those take is given back beforehand."""
+"""Looked-up values are quadratic B-splines of texture points this fine; the loss is compensated beforehand."""
 LARGEST_TEXTURE = 4096
 """Points a side of a mask texture: 64 MiB."""
 POINTS_AT_ONCE = 2**20
 """Points of a texture that are averaged at once, in float64: 8 MiB."""
 DIVIDED = 4
-"""Samples before the first and after the last at which finer ones may stand."""
+"""Samples before the first and after the last at which finer samples may stand."""
 GIVEN_BACK = np.polynomial.polynomial.polypow([1, 1 / 6, 3 / 40, 5 / 112, 35 / 1152], 3)[:5]
-"""The gain of a texture's filter in powers of sin² πν: a power of arcsin's series, see `_given_back`."""
+"""Gain of a texture's filter in powers of sin² πν: a power of the arcsin series, see `_given_back`."""
 TEXTURE_FILTER = 5
-"""Weights on each side of a texture's filter, beside those that the box of a sample takes."""
+"""Weights on each side of a texture's filter, in addition to the box of a sample."""
 AROUND = 2
-"""Points of a texture around what is looked up: those of splines, and what the filter leaves beside an edge."""
+"""Points of a texture around the looked-up region: for splines, and for what the filter leaves next to an edge."""
 APART = 4
-"""Rows of a texture between what a tap looks up and the texture of taps of another level."""
+"""Rows between the region of a texture that a tap looks up and the texture of taps of another level."""
 SPLINE = 1.5
-"""Points of a texture on each side that a look-up by quadratic B-splines takes."""
+"""Points of a texture on each side that a look-up by quadratic B-splines reads."""
 ROUNDING = 1e-6
-"""Points or pixels, over a whole view, that are rounding."""
+"""Deviations over a whole view, in points or pixels, below which they count as rounding."""
 ROOM = 0.1
-"""By how much of what samples meet of a mask a texture that is kept reaches beyond it on each side."""
+"""Margin of a kept texture on each side, as a share of the region of the mask that samples meet."""
 COARSER = 1.5
-"""By how much the footprint of samples may change before another texture would be made."""
+"""Factor by which the footprint of samples may change before another texture would be made."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Footing(Brief):
     """How a mask is averaged over the footprints of samples in taps of one level.
 
-    A footprint is a parallelogram of the cell of a view's part, and of a sample's: a mean along four sides. Where
-    all lie along the axes that is a mean over two boxes: the wider one is taken by the pattern's own means, the
-    other by filters of the texture. Where they do not, all is done by a filter.
+    A footprint is the convolution of two parallelograms, a part of a view's cell and a sample's cell: a mean along
+    four sides. If all sides lie along the axes, it is a mean over two boxes: the pattern's own mean averages
+    over the wider box, filters of the texture over the other. Otherwise a filter does everything.
 
     Args:
-        by_views: along (x, y), whether the box of a view's part is the wider one; None where sides are turned.
+        by_views: along (x, y), whether the box of a view's part is the wider one; None if sides are rotated.
         beside: weights of the filters along (x, y) on each side of their middles.
-        top: row of the texture at which that of these taps begins.
+        top: row of the texture at which the texture of these taps begins.
     """
 
     by_views: NDArray[np.bool_] | None
@@ -72,13 +72,13 @@ class Footing(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lattice(Brief):
-    """Where the points of a mask's texture stand, on the mask, and how long the filters are that make it.
+    """Places of the points of a mask's texture on the mask, and the lengths of the filters that make it.
 
     Args:
-        first: numbers (x, y) of the first point; number 0 stands at the mask's middle.
-        last: of the last point.
+        first: numbers (x, y) of the first point; number 0 is at the mask's middle.
+        last: numbers of the last point.
         spacing: (x, y) of the points, metres.
-        footings: of the taps of each level; their textures stand one below the other.
+        footings: of the taps of each level; their textures are stacked vertically.
     """
 
     first: Array
@@ -87,20 +87,20 @@ class Lattice(Brief):
     footings: tuple[Footing, ...]
 
     def like(self, other: Lattice) -> bool:
-        """Whether one serves as well as the other."""
+        """Whether the two lattices are interchangeable."""
         ratio = self.spacing / other.spacing
         return len(self.footings) == len(other.footings) and bool(np.maximum(ratio, 1 / ratio).max() < COARSER)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TextureChoices(Brief):
-    """How the texture of a mask is made, and read.
+    """How the texture of a mask is made and read.
 
     Args:
-        means: how the means are taken of which it is made, for taps of each level, by rows that are averaged at
-            once; None: by the pattern itself, in single precision, where nothing has to follow.
-        lattice: where its points stand.
-        straight: of the steps from sample to sample across it (2×2), which are rounding.
+        means: how its means are computed, for taps of each level, by blocks of rows that are averaged at once;
+            None: by the pattern itself, in single precision, if no parameter follows a camera.
+        lattice: places of its points.
+        straight: which steps from sample to sample across it (2×2) are rounding.
     """
 
     means: tuple[tuple[MeanChoice | None, ...], ...] | None
@@ -116,9 +116,9 @@ class MaskMet(Brief):
         plane: the mask.
         taps: of the plan.
         samples: (rows, columns) of a view.
-        place: at which sample (0, 0) of each tap meets it, (rows of taps, columns of taps, 2), metres.
+        place: where sample (0, 0) of each tap meets it, (rows of taps, columns of taps, 2), metres.
         sides: of the footprints of samples in taps of each level, (2, 4): of a view's part, and of a sample.
-        finest: those of the finest level, which a piece of a light field may lack.
+        finest: sides for the finest level, which a piece of a light field may lack.
     """
 
     plane: Plane
@@ -139,7 +139,7 @@ class MaskMet(Brief):
         fine: int,
         over_samples: bool = True,
     ) -> MaskMet:
-        """A mask, met.
+        """The mask as taps meet it.
 
         Args:
             plane: the mask.
@@ -149,8 +149,8 @@ class MaskMet(Brief):
             motion: see `tap_origin`.
             samples: (rows, columns) of a view.
             fine: parts of a sample, each way.
-            over_samples: whether to average over the sample's cell besides that of the view: samples that are
-                points meet the mask in a point.
+            over_samples: whether to average over the sample's cell in addition to the view's cell: point samples
+                meet the mask in a point.
         """
         place = tap_origin(plane.at_index, plane.offset, taps.index, taps.shift + off_middle, motion)
         sample_sides = plane.sample_step / fine * over_samples
@@ -159,7 +159,7 @@ class MaskMet(Brief):
         return cls(plane, taps, samples, place, sides, finest)
 
     def choices(self, follow: Follow | None = None) -> TextureChoices:
-        """How the mask's texture is best made; with room around what is read where it follows a camera."""
+        """Choose how the mask's texture is made, with a margin around the region read if it follows a camera."""
         lattice = self._lattice(0.0 if follow is None else ROOM)
         tiny = np.abs(self.plane.sample_step / lattice.spacing[:, None]) * max(self.samples) < ROUNDING
         if follow is None:
@@ -168,18 +168,18 @@ class MaskMet(Brief):
         means = tuple(
             tuple(choose_mean(self.plane.pattern, boxes) for _, boxes in each.rectangles()) for each in averaged
         )
-        # Only what leads from rows to columns and back is left out, for all else may begin to grow.
+        # Only the cross terms between rows and columns count as rounding: the others may begin to grow.
         return TextureChoices(means, lattice, tiny & ~np.eye(2, dtype=bool))
 
     def look_up(self, choices: TextureChoices, parts: Parts = NONE_KEPT) -> tuple[MaskLookup, Textured]:
-        """The mask averaged over a sample's footprint: as a texture that each sample reads, and how it was made.
+        """The mask averaged over a sample's footprint, as a texture for samples to read, and how it was made.
 
         Args:
             choices: how.
-            parts: what is kept of plans nearby.
+            parts: cached parts of nearby plans.
 
         Raises:
-            InputError: samples that meet the mask beyond the points that were chosen, or no longer along them.
+            InputError: samples meet the mask beyond the chosen points, or no longer along them.
         """
         plane, lattice, sides = self.plane, choices.lattice, self.sides
         first, last = _ends(lattice.spacing, *self._region)
@@ -218,10 +218,10 @@ class MaskMet(Brief):
         return _region(self.place, self.plane.sample_step, self.samples, self._bound)
 
     def _lattice(self, room: float) -> Lattice:
-        """The lattice of the texture: one, whatever part of it is needed: pieces of a light field read alike.
+        """The lattice of the texture, independent of the part that is read: pieces of a light field read alike.
 
         Args:
-            room: around what is read, a share of it.
+            room: margin around what is read, as a share of it.
         """
         bound, (low, high) = self._bound, self._region
         spacing = _spacing(self._footprints[-1], np.minimum(2 * bound, high - low))
@@ -263,7 +263,7 @@ def _boxes(sides: Array) -> tuple[Array, Array]:
 def _tops(
     place: Array, step: Array, samples: tuple[int, int], taps: Taps, spacing: float, ends: tuple[float, float]
 ) -> list[int]:
-    """Rows at which the textures of taps of each level begin: so far apart that no tap meets those of others.
+    """Rows at which the textures of taps of each level begin, spaced so that no tap reads those of other levels.
 
     Args:
         place: see `MaskMet`.
@@ -291,7 +291,7 @@ def _region(place: Array, step: Array, samples: tuple[int, int], bound: Array) -
         place: of sample (0, 0) of each tap, (..., 2).
         step: 2×2, from sample to sample.
         samples: (rows, columns) of a view.
-        bound: half the size (x, y) of what there is to read.
+        bound: half the size (x, y) of the readable region.
     """
     rows, columns = samples
     ends = [[k, l] for k in (-DIVIDED, columns - 1 + DIVIDED) for l in (-DIVIDED, rows - 1 + DIVIDED)]
@@ -320,7 +320,7 @@ def _texture(
         lattice: its points.
         sides: see `MaskMet`.
         chosen: see `TextureChoices.means`.
-        parts: what is kept of plans nearby.
+        parts: cached parts of nearby plans.
     """
     found: list[NDArray[np.floating]] = []
     for level, (footing, each) in enumerate(zip(lattice.footings, sides, strict=True)):
@@ -353,11 +353,11 @@ class Textured(Brief):
         return _texture(pattern, self.lattice, self.sides, self.means)
 
     def seen(self, axis: int, place: Array) -> tuple[Array, Array]:
-        """From where to where a pattern counts in what is looked up at places of the texture.
+        """The range of a pattern that affects what is looked up at places of the texture.
 
         Args:
-            axis: 0 of (x, y), or 1.
-            place: columns of the texture, or rows, counted from those at which a tap's begins.
+            axis: 0 for x, 1 for y.
+            place: columns of the texture, or rows, counted from where a tap's texture begins.
 
         Returns:
             The lowest and the highest x, or y, on the mask, metres.
@@ -371,7 +371,7 @@ class Textured(Brief):
 
 
 def by_mask_in_path(n: int, plane: Plane, kept: Textured) -> Linear:
-    """How the texture of the n-th mask in mid-path follows the cells of its pattern.
+    """The linear map from the cells of its pattern to the texture of the n-th mask in mid-path.
 
     Args:
         n: its number.
@@ -392,7 +392,7 @@ def texture_back(plane: Plane, kept: Textured, weights: Array, cells: Cells) -> 
         plane: the mask.
         kept: how its texture was made.
         weights: of the texture's points, (rows, columns).
-        cells: the very object.
+        cells: the same object as in the pattern.
     """
     total = np.zeros(cells.values.shape)
     rows = round(kept.lattice.last[1] - kept.lattice.first[1]) + 1
@@ -411,7 +411,7 @@ class _Averaging(Brief):
         x: places, metres.
         y: likewise.
         size: (width, height) of the rectangles.
-        filters: (across, down), or a single one of the plane, (rows, columns), all symmetric about their middles.
+        filters: (across, down), or a single 2-D filter, (rows, columns), all symmetric about their middles.
     """
 
     x: Array
@@ -421,7 +421,7 @@ class _Averaging(Brief):
 
     @classmethod
     def of(cls, lattice: Lattice, footing: Footing, sides: Array) -> _Averaging:
-        """By which the texture of taps of one level is made."""
+        """The averaging that makes the texture of taps of one level."""
         x, y = (
             np.arange(first - beside, last + beside + 1) * apart
             for first, last, beside, apart in zip(
@@ -442,14 +442,14 @@ class _Averaging(Brief):
         return cls(x, y, (float(wide[0]), float(wide[1])), (across, down))
 
     def rectangles(self) -> list[tuple[NDArray[np.int64], Boxes]]:
-        """Rows that are averaged at once, and their rectangles."""
+        """Blocks of rows that are averaged at once, and their rectangles."""
         pieces = _rows_at_once(self.y.size, self.x.size)
         return [(rows, Boxes(self.x[None, :], self.y[rows, None], *self.size)) for rows in pieces]
 
     def means(
         self, pattern: Pattern, chosen: tuple[MeanChoice | None, ...] | None, parts: Parts
     ) -> NDArray[np.floating]:
-        """The means, without the margin that filters take."""
+        """The means, without the margin that the filters consume."""
         found = np.empty((self.y.size, self.x.size), dtype=np.float32 if chosen is None else np.float64)
         for n, (rows, boxes) in enumerate(self.rectangles()):
             found[rows] = mean_over(pattern, boxes, None if chosen is None else chosen[n], parts)
@@ -459,7 +459,7 @@ class _Averaging(Brief):
         self, pattern: Pattern, weights: Array, chosen: tuple[MeanChoice | None, ...] | None, cells: Cells
     ) -> Array:
         """From weights of the means to weights of the cells of a pattern."""
-        # Filters are symmetric: a mean counts in all points that its own filter reaches.
+        # Filters are symmetric: a mean affects all points that its own filter reaches.
         beside = [(n // 2,) * 2 for n in _reach(self.filters)]
         wide = np.pad(weights, [(2 * low, 2 * high) for low, high in beside])
         means = np.asarray(_filtered(wide, self.filters), dtype=np.float64)
@@ -470,17 +470,17 @@ class _Averaging(Brief):
 
 
 def _reach(filters: tuple[Array, ...]) -> tuple[int, ...]:
-    """(rows, columns) of what filters take together."""
+    """(rows, columns) that the filters span together."""
     return filters[0].shape if len(filters) == 1 else (len(filters[1]), len(filters[0]))
 
 
 def _rows_at_once(rows: int, columns: int) -> list[NDArray[np.int64]]:
-    """Rows of a texture in pieces that are averaged at once."""
+    """Rows of a texture in blocks that are averaged at once."""
     return np.array_split(np.arange(rows), -(-rows * columns // POINTS_AT_ONCE))
 
 
 def _filter(box: float, beside: int) -> Array:
-    """The filter of a texture along one axis: a mean over a box, and what looking it up by splines takes.
+    """The filter of a texture along one axis: a mean over a box, and compensation of the look-up by splines.
 
     Args:
         box: its width in points of the texture.
@@ -490,7 +490,7 @@ def _filter(box: float, beside: int) -> Array:
 
 
 def _filter_of_plane(sides: Array, beside: tuple[int, int]) -> Array:
-    """The filter (rows, columns) that makes means over parallelograms of means over the cells of a texture.
+    """The filter (rows, columns) that turns means over the cells of a texture into means over parallelograms.
 
     Args:
         sides: (2, any number), along which to average, one after the other, in points of the texture.
@@ -505,10 +505,11 @@ def _filter_of_plane(sides: Array, beside: tuple[int, int]) -> Array:
 
 
 def _given_back(frequency: Array) -> Array:
-    """The gain before a look-up by quadratic B-splines.
+    """The gain that compensates for a look-up by quadratic B-splines.
 
-    Of a cosine of ν cycles a point these leave sinc³(ν). With s = sin² πν, what gives it back is (arcsin(√s)/√s)³,
-    of whose series `GIVEN_BACK` has the first terms: they lack less than splines add at other frequencies.
+    B-splines reduce a cosine of ν cycles a point to sinc³(ν). With s = sin² πν, the compensation is
+    (arcsin(√s)/√s)³. `GIVEN_BACK` has the first terms of its series; the terms left out are smaller than the
+    splines' aliasing.
 
     Args:
         frequency: ν.
@@ -517,7 +518,7 @@ def _given_back(frequency: Array) -> Array:
 
 
 def _filtered(means: NDArray[np.floating], filters: tuple[Array, ...]) -> NDArray[np.floating]:
-    """Means (rows, columns) filtered, without the margin that this takes."""
+    """Means (rows, columns) filtered, without the margin that the filters consume."""
     from scipy.ndimage import convolve1d
     from scipy.signal import oaconvolve
 
@@ -530,12 +531,12 @@ def _filtered(means: NDArray[np.floating], filters: tuple[Array, ...]) -> NDArra
 
 
 def texture_error(texture: NDArray[np.floating]) -> float:
-    """By how much what is looked up between points of a texture errs, root mean square over all places.
+    """Root mean square error of values looked up between points of a texture, over all places.
 
-    Splines whose losses are given back follow parabolas. Where the third derivative is d, in points, what is
-    looked up f beside a point errs by d·f(¼ − f²)/6, root mean square |d|/√30240: the leading term, too low by a
-    tenth where a period has nine points, by a third where it has five. The derivative is taken from four points
-    each, two points on from one to the next.
+    Compensated splines reproduce parabolas. With a third derivative d, in points, the value at distance f from a
+    point is wrong by d·f(¼ − f²)/6, root mean square |d|/√30240. This is the leading term: too low by a tenth at
+    nine points a period, by a third at five. Each derivative is estimated from four points, at every second
+    point.
 
     Args:
         texture: (rows, columns).
@@ -555,10 +556,10 @@ def texture_error(texture: NDArray[np.floating]) -> float:
 
 
 def cleaned(step: Array, samples: tuple[int, int], straight: NDArray[np.bool_]) -> Array:
-    """Steps across a texture, in points from sample to sample, without what is rounding over a whole view.
+    """Steps across a texture, in points from sample to sample, with the rounding errors set to zero.
 
     Raises:
-        InputError: steps that were rounding are no longer.
+        InputError: steps that were rounding no longer are.
     """
     if (straight & (np.abs(step) * max(samples) >= ROUNDING)).any():
         raise plan_again("rows of samples that lie along rows of a mask")

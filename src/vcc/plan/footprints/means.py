@@ -1,8 +1,8 @@
-"""Means of patterns over rectangles, as numbers that follow the rectangles and the patterns smoothly.
+"""Means of patterns over rectangles that follow the rectangles and the patterns smoothly.
 
-A pattern without a mean in closed form is sampled on a raster. Computed for each camera alone, its points would
-move with the rectangles, and what is hard in a pattern would jump from point to point. Where numbers follow a
-camera, the raster is chosen once: its points stand still on the pattern, and means are exact for what they show.
+A pattern without a closed-form mean is sampled on a raster. If the raster were chosen anew for each camera, its
+points would move with the rectangles, and hard edges would jump from point to point. If parameters follow a
+camera, the raster is therefore chosen once and stays fixed on the pattern; means of the raster values are exact.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from vcc.shapes.stacked_patterns import Product, Shifted
 Array = NDArray[np.float64]
 
 ROOM = 0.25
-"""By how much of what they cover rasters reach beyond it on each side, besides a rectangle."""
+"""Margin of a raster on each side, as a share of the region covered, in addition to one rectangle."""
 
 
 class Boxes(NamedTuple):
-    """Rectangles side by side: their centres, metres, arrays that broadcast, and the size of each."""
+    """Rectangles: their centres in metres (arrays that broadcast) and their common size."""
 
     x: Array
     y: Array
@@ -51,11 +51,11 @@ class Boxes(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeanChoice(Brief):
-    """How the mean of a pattern without one in closed form is taken.
+    """How the mean of a pattern without a closed form is computed.
 
     Args:
-        rasters: (across, down) on which it is looked at; None: in parts of each rectangle.
-        factors: of several patterns that multiply one another, how the mean of each is taken.
+        rasters: (across, down) on which the pattern is sampled; None: each rectangle is sampled in parts.
+        factors: if several patterns are multiplied, how the mean of each is computed.
     """
 
     rasters: tuple[Raster, Raster] | None
@@ -63,7 +63,7 @@ class MeanChoice(Brief):
 
 
 def choose_mean(pattern: Pattern, boxes: Boxes) -> MeanChoice | None:
-    """How the mean of a pattern over rectangles is taken so that it follows them; None: by its own `mean`."""
+    """Choose how a pattern's mean over rectangles is computed so that it follows them; None: by its own `mean`."""
     if isinstance(pattern, Shifted):
         return choose_mean(pattern.pattern, _from_middle(pattern, boxes))
     if isinstance(pattern, Bounded) or (isinstance(pattern, Product) and len(pattern.factors) == 1):
@@ -85,11 +85,11 @@ def mean_over(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, parts: 
     Args:
         pattern: any.
         boxes: the rectangles.
-        chosen: how the mean is taken (`choose_mean`).
-        parts: what is kept of plans nearby.
+        chosen: how the mean is computed (`choose_mean`).
+        parts: cached parts of nearby plans.
 
     Raises:
-        InputError: rectangles beyond the raster that was chosen.
+        InputError: rectangles beyond the chosen raster.
     """
     if chosen is None:
         return pattern.mean(*boxes)
@@ -117,7 +117,7 @@ def mean_over(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, parts: 
 
 
 def _values(pattern: Pattern, points: Boxes, chosen: MeanChoice) -> Array:
-    """What a pattern shows at points that stand for rectangles: of several, the product of their means."""
+    """Values of a pattern at points for rectangles; for a product, the product of the factors' means."""
     if isinstance(pattern, Product):
         pairs = zip(pattern.factors, chosen.factors, strict=True)
         means = (mean_or_value(factor, points, its) for factor, its in pairs)
@@ -126,7 +126,7 @@ def _values(pattern: Pattern, points: Boxes, chosen: MeanChoice) -> Array:
 
 
 def _from_middle(pattern: Shifted, boxes: Boxes) -> Boxes:
-    """Rectangles counted from the middle of what is shifted."""
+    """Rectangles relative to the middle of a shifted pattern."""
     return boxes._replace(x=boxes.x - pattern.middle[0], y=boxes.y - pattern.middle[1])
 
 
@@ -135,14 +135,14 @@ def _plain(factor: Pattern) -> Pattern:
 
 
 def _closed(pattern: Pattern) -> bool:
-    """Whether a pattern's mean follows rectangles smoothly by itself."""
+    """Whether a pattern's own `mean` follows rectangles smoothly."""
     if isinstance(pattern, CellApertures) and pattern.lattice.rotation:
         return False
     return type(pattern).mean is not Pattern.mean
 
 
 def parts_of(boxes: Boxes) -> list[Boxes]:
-    """Each rectangle's parts, one of each at a time."""
+    """The parts of each rectangle; each item of the list holds one part of every rectangle."""
     steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
     x, y, width, height = boxes
     part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
@@ -150,21 +150,21 @@ def parts_of(boxes: Boxes) -> list[Boxes]:
 
 
 def points_of(rasters: tuple[Raster, Raster]) -> Boxes:
-    """The rectangles that the points of rasters stand for."""
+    """The rectangles that the points of a raster stand for."""
     across, down = rasters
     return Boxes(across.places[None, :], down.places[:, None], across.step, down.step)
 
 
 def mean_or_value(factor: Pattern, points: Boxes, chosen: MeanChoice | None) -> Array:
-    """Means over the parts that points of a raster stand for; without a closed form, values in their middles."""
+    """Means over the rectangles of raster points; for patterns without a closed form, values at the points."""
     return mean_over(factor, points, chosen) if _closed(_plain(factor)) else factor(points.x, points.y)
 
 
 def _of_raster(found: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Array:
-    """Means over rectangles of what stands between the points of rasters, bilinear, in closed form.
+    """Means over rectangles of the bilinear interpolation of raster values, in closed form.
 
-    Of a function that is linear between points, the integral up to a place is a quadratic B-spline of the sums up
-    to the borders between points: means have a continuous slope.
+    The integral of a piecewise linear function up to a place is a quadratic B-spline of the sums up to the borders
+    between points. So the means have a continuous slope.
     """
     across, down = rasters
     values = np.broadcast_to(found, (down.places.size, across.places.size))
@@ -184,7 +184,7 @@ def _of_raster(found: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Ar
 
 
 def of_raster_back(weights: Array, rasters: tuple[Raster, Raster], boxes: Boxes) -> Array:
-    """From weights of means over rectangles to weights of what the points of rasters show, (rows, columns)."""
+    """From weights of means over rectangles to weights of the raster values, (rows, columns)."""
     across, down = rasters
     rows, columns = down.places.size + 1, across.places.size + 1
     shape = np.broadcast_shapes(boxes.x.shape, boxes.y.shape)
@@ -198,7 +198,7 @@ def of_raster_back(weights: Array, rasters: tuple[Raster, Raster], boxes: Boxes)
         sums = high.T @ weights @ wide
     else:
         sums = (high.multiply(weights.reshape(-1, 1)).T @ wide).toarray()
-    # Each point counts in all sums up to borders behind it.
+    # Each point counts in the sums up to all borders behind it.
     return np.asarray(sums[::-1, ::-1].cumsum(0).cumsum(1)[::-1, ::-1][1:, 1:])
 
 
@@ -213,12 +213,12 @@ def _sides(rasters: tuple[Raster, Raster], boxes: Boxes) -> list[list[Array]]:
 
 
 def _place(raster: Raster, at: Array) -> Array:
-    """Places as numbers of borders between the points of a raster, held where splines find all that they take."""
+    """Places as numbers of borders between raster points, clipped to where splines have all their points."""
     return np.clip((at - raster.low) / raster.step, 1.0, raster.places.size - 1.0)
 
 
 def _up_to(place: Array, borders: int) -> Any:
-    """What each border counts for the integral up to places: a sparse matrix (places, borders)."""
+    """Weight of each border in the integral up to each place: a sparse matrix (places, borders)."""
     from scipy.sparse import csr_array
 
     point, counts, _ = three_around(place.reshape(-1), borders)
@@ -230,10 +230,10 @@ def _up_to(place: Array, borders: int) -> Any:
 
 
 def check_within(pattern: Pattern, boxes: Boxes, chosen: MeanChoice) -> None:
-    """Check that rectangles lie where a pattern is looked at.
+    """Check that rectangles lie within the chosen rasters.
 
     Raises:
-        InputError: they do not.
+        InputError: a rectangle lies outside.
     """
     if chosen.rasters is None:
         return
@@ -259,7 +259,7 @@ def _rasters(pattern: Pattern, boxes: Boxes) -> tuple[Raster, Raster] | None:
 
 
 def _raster(centre: Array, length: float, bound: float) -> Raster | None:
-    """`RASTER_PER_CELL` points across a rectangle, fewer where there are many of them, with room around them."""
+    """`RASTER_PER_CELL` points across a rectangle, fewer for many rectangles, with a margin around them."""
     room = length + ROOM * float(np.ptp(centre))
     reach = (1 + ROOM) * bound / 2
     low = max(float(centre.min()) - length / 2 - room, -reach)
@@ -274,18 +274,18 @@ def _raster(centre: Array, length: float, bound: float) -> Raster | None:
     return Raster(np.asarray((np.arange(first, last) + 0.5) * step), first * step, last * step)
 
 
-# --- `mean_over` transposed: from weights of means of a pattern to weights of the cells that it is made of ---
+# --- transpose of `mean_over`: from weights of a pattern's means to weights of the cells that it is made of ---
 
 
 def mean_back(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, weights: Array, cells: Cells) -> Array:
-    """What each value of an array of cells adds to Σ weights · mean of a pattern.
+    """The gradient of Σ weights · mean of a pattern with respect to the values of an array of cells.
 
     Args:
-        pattern: of which the cells are a part, once (`vcc.shapes.mean_back.holds`).
+        pattern: contains the cells exactly once (`vcc.shapes.mean_back.holds`).
         boxes: the rectangles that the pattern is averaged over.
         chosen: how (`choose_mean`).
         weights: of the means, of the shape that the boxes' places broadcast to.
-        cells: the very object.
+        cells: the same object as in the pattern.
 
     Returns:
         (rows, columns) of the cells.
@@ -305,7 +305,7 @@ def mean_back(pattern: Pattern, boxes: Boxes, chosen: MeanChoice | None, weights
     if not sheet.others:
         return sheet.back(tiles_back(sheet.tiles, (x, y), (width, height), weights))
 
-    assert chosen is not None  # several patterns together have no mean in closed form
+    assert chosen is not None  # several patterns together have no closed-form mean
     of_factors = {content(factor): its for factor, its in zip(pattern.factors, chosen.factors, strict=True)}
 
     def back(points: Boxes, share: Array) -> Array:

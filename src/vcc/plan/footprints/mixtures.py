@@ -1,8 +1,8 @@
-"""Pictures of cameras that differ in a mask's cells, as sums of a few pictures weighed by what cells let through.
+"""Images of cameras that differ in a mask's cells, as sums of a few images weighted by the cells' transmission.
 
-A picture is linear in the cells. Of a mask at the views, each view's picture counts by the view's open share. Of a
-mask in mid-path, a pixel sees a window of the cells and no others: cells that stand at least a window apart are
-opened together in one picture, and each pixel's light through them is light through one cell.
+An image is linear in the cells. For a mask at the views, each view's image is weighted by the view's open share.
+For a mask in mid-path, each pixel sees only a window of the cells: cells at least a window apart are opened
+together in one image, and the light of each pixel passes only one of them.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from vcc.shapes.patterns import Cells
 Array = NDArray[np.float64]
 
 NEAR = 1e-6
-"""Of a cell: borders so near are taken for reached."""
+"""Share of a cell: borders this near count as reached."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mixture(Brief):
-    """Pictures as sums: pixel (y, x) of picture n is the sum over p and q of
-    numbers[n, down[y, p], across[x, q]] · (pixel (y, x) of the picture by plan p · (columns of ``across``) + q).
+    """Images as sums: pixel (y, x) of image n is the sum over p and q of
+    numbers[n, down[y, p], across[x, q]] · (pixel (y, x) of the image by plan p · (columns of ``across``) + q).
 
     Args:
-        members: which cameras' they are.
-        plans: by which the few pictures are made.
-        numbers: what each camera takes, (members, rows, columns).
-        down: for each row of pixels, the row of numbers by which each plan's picture counts, (rows, plans down).
+        members: numbers of the cameras.
+        plans: that make the few images.
+        numbers: weights of each camera, (members, rows, columns).
+        down: for each row of pixels, the row of ``numbers`` that weights each plan's image, (rows, plans down).
         across: for each column, likewise, (columns, plans across).
-        missing: of each member: what its light field lacks; found by those who know what it asks for.
+        missing: of each member: what its light field lacks; filled in by the caller.
     """
 
     members: tuple[int, ...]
@@ -51,11 +51,11 @@ class Mixture(Brief):
 
 
 def of_views(plan: Plan, weights: Array) -> Mixture:
-    """Pictures by a plan that weigh its views otherwise.
+    """Images by a plan with other weights of its views.
 
     Args:
         plan: by footprints.
-        weights: (pictures, rows of taps, columns of taps).
+        weights: (images, rows of taps, columns of taps).
     """
     core = plan.core
     assert isinstance(core, Footprints)
@@ -74,15 +74,15 @@ def of_views(plan: Plan, weights: Array) -> Mixture:
 def of_cells(
     plan: Plan, mask: int, made: Textured, members: Sequence[int], cells: Sequence[Cells], most: int
 ) -> Mixture | None:
-    """Pictures by a plan that look at other cells of a mask in mid-path.
+    """Images by a plan with other cells of a mask in mid-path; None if more than ``most`` plans would be needed.
 
     Args:
-        plan: by footprints, where rows and columns part.
-        mask: which of its masks.
-        made: how its texture was.
+        plan: by footprints, with separable rows and columns.
+        mask: number of the mask.
+        made: how its texture was made.
         members: see `Mixture`.
-        cells: of each of them, all of one size.
-        most: plans. None where it takes more.
+        cells: of each member, all of one size.
+        most: plans.
     """
     core, shape = plan.core, cells[0].values.shape
     assert isinstance(core, Footprints)
@@ -100,7 +100,7 @@ def of_cells(
     lookups = [replace(core.masks[mask], texture=texture) for texture in textures]
     masks = [(*core.masks[:mask], lookup, *core.masks[mask + 1 :]) for lookup in lookups]
     down, across = (
-        # Of the cells of each class, the one in the window.
+        # For each class of cells, the cell within the window.
         first[:, None] + (np.arange(count) - first[:, None]) % count
         for first, count in zip(firsts, counts, strict=True)
     )
@@ -116,9 +116,9 @@ def of_cells(
 def _windows(
     core: Footprints, mask: int, made: Textured, cells: Cells, axis: int, pixels: int, guard: int
 ) -> tuple[NDArray[np.int64], int]:
-    """The first of the cells that each row (axis 0) or column (1) of pixels sees, and how many it sees at most.
+    """The first cell that each row (axis 0) or column (1) of pixels sees, and the largest number that any sees.
 
-    A pixel sees what falls on the pixels of the raster that filters look at around it.
+    A pixel sees the light on all raster pixels that filters read around it.
     """
     lookup, used = core.masks[mask], core.weights != 0
     met, of_tap, step, met_step = (

@@ -1,10 +1,10 @@
-"""Footprints: a plan's core where optics fold into one matrix, as plain data for an engine.
+"""Footprints: a plan's core if the optics fold into one matrix, as plain data for an engine.
 
 The raster is one sum over the samples of the light field,
 
     I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q)),
 
-in which every place is an affine function of the sample's index. The engine knows nothing of optics.
+in which every place is an affine function of the sample's index. The engine needs no optics.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MaskLookup(Value):
-    """A mask in mid-path, averaged over the cell of a sample: each sample looks its weight up here.
+    """A mask in mid-path, averaged over a sample's cell, as a texture in which samples look up their weights.
 
     Texture coordinates of sample (k, l) in view tap (b, a): (column, row) = (column[b, a], row[b, a])
     + step · (k, l). Weights are quadratic B-splines of the texture's points (`vcc.base.lookup.three_around`) with
-    zeros around them: they follow places with a continuous slope.
+    zeros around them, so they depend on places with a continuous slope.
 
     Args:
-        texture: what splines make the mean transmission over a sample's footprint of, at regular points, (rows,
+        texture: spline coefficients of the mean transmission over a sample's footprint, at regular points, (rows,
             columns), float32 or float64.
         column: texture column of sample (0, 0) in each view tap, (rows of taps, columns of taps).
         row: texture row, likewise.
         step: 2×2, texture points per index step: [[column/k, column/l], [row/k, row/l]].
-        label: which element this is.
+        label: of the element.
     """
 
     texture: NDArray[np.floating]
@@ -57,7 +57,7 @@ class MaskLookup(Value):
     def places(self, b: int, a: int, k: Array, l: Array) -> tuple[Array, Array]:
         """Texture rows and columns at which samples with these indices are looked up: shapes (l, k).
 
-        Of length 1 along an axis that they do not depend on.
+        The length is 1 along an axis that they do not depend on.
         """
 
         def place(first: Array, by_k: float, by_l: float) -> Array:
@@ -68,7 +68,7 @@ class MaskLookup(Value):
         return place(self.row, *self.step[1]), place(self.column, *self.step[0])
 
     def moved(self, k: int, l: int) -> MaskLookup:
-        """Looked up by samples that begin at sample (k, l) of those that it was made for."""
+        """The look-up for samples that begin at sample (k, l) of the original ones."""
         return replace(
             self,
             column=self.column + self.step[0] @ (k, l),
@@ -76,7 +76,7 @@ class MaskLookup(Value):
         )
 
     def of_taps(self, taps: tuple[NDArray[np.intp], ...]) -> MaskLookup:
-        """Looked up by some of the view taps only; ``taps`` is an open mesh of their (rows, columns)."""
+        """The look-up for some of the view taps only; ``taps`` is an open mesh of their (rows, columns)."""
         return replace(self, column=self.column[taps], row=self.row[taps])
 
 
@@ -84,26 +84,26 @@ class MaskLookup(Value):
 class Footprints(Value):
     """How samples of a light field add up to a raster of pixels.
 
-    A *view tap* (b, a) is a view, or where views are interpolated a place between views, that contributes
-    to the picture: it reads view (view_rows[b], view_columns[a]). Places are in pixels of the raster, which is the
-    sensor with some more pixels on every side.
+    A *view tap* (b, a) is a view, or a place between views if views are interpolated, that contributes to the
+    image: it reads view (view_rows[b], view_columns[a]). Places are in pixels of the raster, which is the sensor
+    with some more pixels on every side.
 
     Args:
         raster_shape: (rows, columns) of pixels.
         interpolation: of footprints: ``"nearest"``, ``"linear"``, ``"cubic"`` or ``"spline"``.
-        scale: turns radiance times shares into irradiance.
+        scale: converts radiance times shares into irradiance.
         view_rows: row of views that each row of taps reads.
         view_columns: column of views that each column of taps reads.
-        weights: (rows of taps, columns of taps), the share of each tap's cell that apertures let pass.
+        weights: (rows of taps, columns of taps), the share of each tap's cell that apertures transmit.
         x: raster column of sample (0, 0) in each tap, (rows of taps, columns of taps).
         y: raster row, likewise.
         step: 2×2, pixels per index step: [[x/k, x/l], [y/k, y/l]], |y/l| the larger of its row.
         samples: (rows, columns) of samples of a view.
         masks: masks in mid-path.
-        refine: how many finer samples replace one, along each pixel axis.
+        refine: number of finer samples that replace one, along each pixel axis.
         opening: the share of a pixel's width, and of its height, that is sensitive ("nearest" ignores it).
-        sharpen_samples: an odd number of weights by which samples are filtered along both axes where they are
-            divided (``refine``), or None.
+        sharpen_samples: an odd number of weights of the filter along both axes that is applied to samples when
+            they are divided (``refine``), or None.
     """
 
     raster_shape: tuple[int, int]
@@ -123,16 +123,16 @@ class Footprints(Value):
 
     method: ClassVar[str] = "footprints"
     border: ClassVar[int] = 0
-    """Views around a block that are looked at with it."""
+    """Views around a block that are read with it."""
 
     def check_wanted(self, wanted: Collection[str]) -> None:
-        """Whether there is a derivative to each of some numbers.
+        """Check that derivatives to these parameters exist.
 
         Args:
-            wanted: names of the core's numbers (`vcc.plan.parameters.numbers`).
+            wanted: names of the core's parameters (`vcc.plan.parameters.parameters`).
 
         Raises:
-            InputError: a number to which there is none, with why.
+            InputError: a parameter without a derivative, with the reason.
         """
         known = parameters(self) if wanted else {}
         for name in wanted:
@@ -151,7 +151,7 @@ class Footprints(Value):
         return Division.of(self.interpolation, samples, self.refine, self.sharpen_samples)
 
     def part(self, block: Block) -> Footprints:
-        """What adds a block's samples: the rasters of all blocks of a light field sum to the raster of it."""
+        """The footprints of a block's samples: the rasters of all blocks sum to the raster of the light field."""
         (l, _), (k, _) = block.pixel_rows, block.pixel_columns
         rows, columns, taps = self._taps(block)
         return replace(
@@ -166,14 +166,14 @@ class Footprints(Value):
         )
 
     def required(self, wanted: Collection[str]) -> set[str]:
-        """The numbers of a part to which derivatives make up those to some of this core's numbers."""
+        """The parameters of a part whose derivatives are needed for the given parameters of this core."""
         stepped = [where for where in self._stepped if where[2] in wanted]
         return {*wanted, *(name for where in stepped for name in where)}
 
     def full_gradients(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
-        """Derivatives to the numbers of `part` as those to this core's own.
+        """Convert derivatives to the parameters of `part` into derivatives to this core's own.
 
-        A part begins at its first sample, so that steps move all of its places.
+        The places of a part are counted from its first sample, so that the steps affect all of them.
         """
         whole = dict(numbers)
         first = np.array([block.pixel_columns[0], block.pixel_rows[0]])
@@ -201,7 +201,7 @@ class Footprints(Value):
         return rows, columns, np.ix_(rows, columns)
 
     def of_columns(self, columns: NDArray[np.intp]) -> Footprints:
-        """With some of its columns of view taps only."""
+        """With the given columns of view taps only."""
         taps = np.ix_(np.arange(len(self.view_rows)), columns)
         return replace(
             self,
@@ -213,29 +213,29 @@ class Footprints(Value):
         )
 
     def guarded(self, pixels: int) -> Footprints:
-        """With so many more pixels around the raster."""
+        """With ``pixels`` more pixels around the raster."""
         rows, columns = self.raster_shape
         shape = (rows + 2 * pixels, columns + 2 * pixels)
         return replace(self, raster_shape=shape, x=self.x + pixels, y=self.y + pixels)
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Which of the views of a light field of this shape are looked at, (v, u): one where none gives light."""
+        """The views that are used of a light field of this shape, (v, u): one view if none gives light."""
         used = np.zeros(shape[:2], dtype=bool)
         rows, columns = np.nonzero(self.weights) if self.weights.any() else ([0], [0])
         used[self.view_rows[rows], self.view_columns[columns]] = True
         return used
 
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """Which pixels of each view may give light to the raster, (v, u, 2, 2); none of views that give none.
+        """The pixels of each view that may give light to the raster, (v, u, 2, 2); empty for unused views.
 
-        They are the box around the samples whose footprints reach the raster: places are affine functions of
-        indices, and so are indices of places.
+        The range is the bounding box of the samples whose footprints reach the raster. It is computed by
+        inverting the affine map from indices to places.
         """
         reach = REACH[self.interpolation]
-        if self.refine > 1:  # finer samples have footprints of their own around those that are divided
+        if self.refine > 1:  # finer samples have footprints of their own around the divided ones
             reach = 2 * reach + (0 if self.sharpen_samples is None else len(self.sharpen_samples) // 2)
         (xk, xl), (yk, yl) = self.step
-        # Along a row of the raster places are followed with the shear, so that it adds to the reach.
+        # Places are followed along a row of the raster with the shear, so the shear adds to the reach.
         beside = reach * (abs(self.column_step) + abs(xl)) + abs(self.shear) + 1, reach * (abs(yk) + abs(yl)) + 1
         rows, columns = self.raster_shape
         used = np.zeros((*shape[:2], 2, 2), dtype=np.intp)
@@ -259,14 +259,14 @@ class Footprints(Value):
         return self if factor == 1 else replace(self, scale=self.scale * factor)
 
     def more(self, samples: int) -> Footprints:
-        """No rays are traced: nothing is added."""
+        """Returns self: no rays are traced."""
         return self
 
     @property
     def separable(self) -> bool:
-        """Whether columns on the sensor follow from columns of the light field alone, and rows from rows.
+        """Whether columns on the sensor depend only on columns of the light field, and rows only on rows.
 
-        Masks are then looked up along rows and columns, too; where a tap meets them is its own affair.
+        Masks are then looked up along rows and columns, too; the place where a tap meets a mask is arbitrary.
         """
         steps = [self.step, *(mask.step for mask in self.masks)]
         return bool(
@@ -290,23 +290,23 @@ class Footprints(Value):
 
     @property
     def shear(self) -> float:
-        """Raster columns by which a sample's place moves per raster row, its column index held."""
+        """Raster columns by which a sample's place moves per raster row, at a fixed column index."""
         (_, xl), (_, yl) = self.step
         return float(xl / yl)
 
     @property
     def direction(self) -> str:
-        """From which side the shares are laid out: by sample ("forward") or by pixel ("backward")."""
+        """Order in which the shares are tabulated: by sample ("forward") or by pixel ("backward")."""
         return "forward" if max(abs(self.row_step), abs(self.column_step)) <= 1 else "backward"
 
     @property
     def taps_used(self) -> int:
-        """How many view taps let any light through."""
+        """Number of view taps that transmit any light."""
         return int(np.count_nonzero(self.weights))
 
     @property
     def samples_touched(self) -> int:
-        """How many samples, refined ones counted, an engine goes through."""
+        """Number of samples that an engine processes, refined samples included."""
         return self.taps_used * self.samples[0] * self.samples[1] * self.refine**2
 
     def __repr__(self) -> str:

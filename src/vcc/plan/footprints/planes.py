@@ -1,4 +1,4 @@
-"""Absorbing elements as the samples of a light field meet them: where, over what footprint, with what weight."""
+"""Absorbing elements as the samples of a light field meet them: place, footprint and weight."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vcc.shapes.tilings import Tile, tiles_of
 Array = NDArray[np.float64]
 
 ALONG_AXES = 1e-9
-"""Of a cell: sides that leave the axes by less are along them."""
+"""Share of a cell: sides that deviate from the axes by less count as parallel to them."""
 
 
 Placed = tuple[Pattern, tuple[float, float]]
@@ -27,11 +27,11 @@ Placed = tuple[Pattern, tuple[float, float]]
 
 @dataclass(frozen=True)
 class PlaneChoices:
-    """Of patterns in one plane, what counts.
+    """Choices for patterns in one plane.
 
     Args:
-        cutting: numbers of those that cut light off, beside the others.
-        about: number, of these, of the one from whose middle all is counted.
+        cutting: numbers of the patterns that cut off light that the others transmit.
+        about: index in ``cutting`` of the pattern whose middle is the origin.
     """
 
     cutting: tuple[int, ...] = choice("what cuts light off")
@@ -39,9 +39,10 @@ class PlaneChoices:
 
 
 def choose_plane(patterns: list[Placed]) -> PlaneChoices:
-    """What counts of patterns in one plane.
+    """Choose the patterns that count in one plane, and the origin.
 
-    About the middle of the smallest, as it would be by itself, whatever the order in which they are given.
+    The origin is the middle of the smallest pattern, as if it were alone, independent of the order of the
+    patterns.
     """
     cutting = tuple(not_clear_next_to_others(patterns))
     sizes = [(float(np.prod(pattern.size)), *middle) for pattern, middle in (patterns[n] for n in cutting)]
@@ -52,7 +53,7 @@ def choose_plane(patterns: list[Placed]) -> PlaneChoices:
 class Plane(Brief):
     """An absorbing element as the samples meet it: place = at_index · (i, j, k, l) + offset, metres.
 
-    Places are counted from the element's middle, which stands at ``decentre`` on the axis' plane.
+    Places are relative to the element's middle, which is at ``decentre`` in its plane.
     """
 
     pattern: Pattern
@@ -74,8 +75,8 @@ class Plane(Brief):
         Args:
             place: (x, y) in metres from index (i, j, k, l, 1), 2×5.
             patterns: one or several.
-            label: what they are called.
-            choices: what of them counts; None chooses now.
+            label: of the plane.
+            choices: the patterns that count; None chooses now.
         """
         choices = choices or choose_plane(patterns)
         patterns = [patterns[n] for n in choices.cutting]
@@ -87,7 +88,7 @@ class Plane(Brief):
     def met_by(
         cls, frame: Affine, rays: Affine, pattern: Pattern, decentre: tuple[float, float], label: str
     ) -> Plane:
-        """The plane of a pattern as samples of this frame meet it, ``rays`` leading from them to the plane."""
+        """The plane of a pattern as samples of this frame meet it; ``rays`` maps from the frame to the plane."""
         return cls.at((rays @ frame).matrix[:2], [(pattern, decentre)], label)
 
     def middle_of_view(self, samples: tuple[int, int]) -> Array:
@@ -98,7 +99,8 @@ class Plane(Brief):
     def boxes(
         self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], parts: int = 1
     ) -> list[tuple[Boxes, float]]:
-        """The cells of taps on a plane that tells views apart only, as rectangles and their shares of a cell.
+        """The cells of taps on a plane that each view meets in one point, as rectangles and their shares of a
+        cell.
 
         Args:
             index: of the views, (rows of taps, columns of taps, 2); see `tap_origin`.
@@ -110,12 +112,12 @@ class Plane(Brief):
         place = tap_origin(self.at_index, self.middle_of_view(samples), index, shift, motion)
         x, y = place[..., 0], place[..., 1]
         if (x == x[:1]).all() and (y == y[:, :1]).all() and x.ndim == 2:
-            x, y = x[:1], y[:, :1]  # a row and a column of places say it all
+            x, y = x[:1], y[:, :1]  # a row and a column of places are enough
         tiles = cell_tiles(self.view_step(motion) / parts)
         return [(Boxes(x + tile.x, y + tile.y, tile.width, tile.height), tile.share) for tile in tiles]
 
     def view_step(self, motion: Array) -> Array:
-        """2×2: metres moved here per view, a point of the scene being followed."""
+        """2×2: metres moved here per view, following a point of the scene."""
         return np.asarray(self.at_index[:, :2] - self.at_index[:, 2:] @ motion)
 
     @property
@@ -125,13 +127,13 @@ class Plane(Brief):
 
 
 def along_axes(sides: Array) -> bool:
-    """Whether vectors (2, n) lie along the axes, but for rounding."""
+    """Whether vectors (2, n) lie along the axes, except for rounding."""
     size = np.abs(sides)
     return bool((size.min(axis=0) <= ALONG_AXES * size.max(axis=0, initial=0.0)).all())
 
 
 def cell_tiles(step: Array) -> tuple[Tile, ...]:
-    """Rectangles that stand for a cell, a parallelogram of two sides: of all cells they cover the plane once.
+    """Rectangles that stand for a cell, a parallelogram: the rectangles of all cells tile the plane.
 
     Args:
         step: 2×2, its sides as columns, metres.
@@ -143,7 +145,7 @@ def cell_tiles(step: Array) -> tuple[Tile, ...]:
 
 
 def depends_on_view_only(plane: Plane, samples: tuple[int, int], motion: Array) -> bool:
-    """Whether all samples of a view meet the plane in one place, but for rounding."""
+    """Whether all samples of a view meet the plane in one place, except for rounding."""
     cell = np.abs(plane.view_step(motion)).sum(axis=1)
     travel = np.abs(plane.sample_step) @ np.array([samples[1], samples[0]])
     return bool((travel <= 1e-6 * cell).all())

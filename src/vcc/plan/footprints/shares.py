@@ -5,7 +5,7 @@ where b is the step from one sample to the next, in pixels. Pixel m receives the
 
     F(m) = Φ((m + ½ − x)/b) − Φ((m − ½ − x)/b),        Φ(a) = ∫₋∞ᵃ φ,
 
-exactly, for any b. (Where only a share a of a pixel's width is sensitive, ½ becomes a/2, and F is divided by a:
+exactly, for any b. (If only a share a of a pixel's width is sensitive, ½ becomes a/2, and F is divided by a:
 the mean over the sensitive area.) Over the pixels the shares sum to one, so no light is lost; over equally
 spaced samples they sum to 1/|b|, so uniform light stays uniform. Nothing is singular at b = 0, where a whole
 view falls into one point. Seen from the sample this is forward evaluation (splatting), seen from the pixel it
@@ -26,18 +26,18 @@ from vcc.base.describe import Brief
 Array = NDArray[np.float64]
 
 REACH = {"nearest": 0.5, "linear": 1.0, "cubic": 2.0, "spline": 2.0, "box": 0.5}
-"""Half the width of each interpolation's footprint, in samples. ``"spline"`` is a cubic B-spline: it does not
-interpolate by itself, but with the filter of the picture that undoes it on the samples (`vcc.plan.sharpening`).
-``"box"`` is for samples that are divided: those are interpolated linearly, and each finer one fills its own cell
-evenly, so that behind a hard edge of a mask no light leaves the cell that let it pass."""
+"""Half the width of each interpolation's footprint, in samples. ``"spline"`` is a cubic B-spline: it interpolates
+only together with the filter of the image that inverts it at the samples (`vcc.plan.sharpening`).
+``"box"`` is for divided samples: they are interpolated linearly, and each finer sample fills its own cell
+uniformly, so that behind a hard edge of a mask no light leaves the cell that transmitted it."""
 
 SMALLEST_STEP = 1e-7
-"""Plans keep steps from sample to sample at this or above, in pixels: a view that falls into a point falls into
-a ten-millionth of a pixel times its samples, and nothing has to be divided by zero."""
+"""Plans keep steps from sample to sample at this or above, in pixels, to avoid division by zero: a view that falls
+into a point becomes a ten-millionth of a pixel times its samples wide."""
 
 TIE = 1e-9
-"""Pixels by which ``"nearest"`` moves its borders: a sample exactly between two pixels goes to the same one
-whatever the rounding."""
+"""Pixels by which ``"nearest"`` moves its borders, so that a sample exactly between two pixels always goes to the
+same one despite rounding."""
 
 
 def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
@@ -56,7 +56,7 @@ def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
         half = r - r * r / 2
     elif interpolation == "spline":
         inner = xp.clip(r, 0.0, 1.0)
-        # ∫₀ʳ ⅔ − x² + x³/2, and from 1 on what is left of a half, ∫ (2 − x)³/6
+        # ∫₀ʳ ⅔ − x² + x³/2, and from 1 on the rest of a half, ∫ (2 − x)³/6
         near = inner * (2.0 / 3.0 + inner * inner * (inner / 8 - 1.0 / 3.0))
         left = (2 - r) * (2 - r)
         half = xp.where(r < 1, near, 0.5 - left * left / 24)
@@ -70,7 +70,7 @@ def cumulative(interpolation: str, a: Any, xp: Any = np) -> Any:
 
 
 def _outer(r: Any) -> Any:
-    return r * (2 + r * (r * (5.0 / 6.0 - r / 8) - 2))  # powers by name take many times as long
+    return r * (2 + r * (r * (5.0 / 6.0 - r / 8) - 2))  # powers by ** take many times as long
 
 
 def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
@@ -92,6 +92,9 @@ def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
 def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: float = 1.0, xp: Any = np) -> Any:
     """F: the share of a sample's light that each pixel receives, for arrays that broadcast.
 
+    ``"nearest"`` follows the paper: if samples are closer than pixels, each falls into the pixel that contains
+    it (forward); if they are further apart, each pixel takes the sample nearest to its middle (backward).
+
     Args:
         interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         pixel: pixel indices, as floating point.
@@ -99,9 +102,6 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: 
         step: pixels from one sample to the next, of any sign, not 0.
         opening: the share of a pixel's width that is sensitive, around its middle.
         xp: the array namespace of the arrays.
-
-    ``"nearest"`` is the paper's: where samples are closer than pixels, each falls into the pixel that holds
-    it (forward); where they are further apart, each pixel takes the sample nearest to its middle (backward).
     """
     size = abs(step)
     offset = pixel - position
@@ -116,10 +116,10 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: 
 def share_slopes(
     interpolation: str, pixel: Any, position: Any, step: float, opening: float = 1.0
 ) -> tuple[Array, Array, Array]:
-    """By how much F grows with a sample's pixel coordinate, with the size |step| and with the opening.
+    """The derivatives of F to a sample's pixel coordinate, to the size |step| and to the opening.
 
-    With a = (m + h − x)/|b| and c = (m − h − x)/|b|, h half the opening, F = (Φ(a) − Φ(c))/2h: to x it grows by
-    (φ(c) − φ(a))/2h|b|, to |b| by (c·φ(c) − a·φ(a))/2h|b|, to 2h by (φ(a) + φ(c))/4h|b| − F/2h.
+    With a = (m + h − x)/|b| and c = (m − h − x)/|b|, h half the opening, F = (Φ(a) − Φ(c))/2h. Its derivatives are
+    (φ(c) − φ(a))/2h|b| to x, (c·φ(c) − a·φ(a))/2h|b| to |b|, and (φ(a) + φ(c))/4h|b| − F/2h to 2h.
 
     Args:
         interpolation: all but ``"nearest"``, whose borders have no slope.
@@ -140,14 +140,14 @@ def share_slopes(
 
 
 def reach_in_pixels(interpolation: str, size: float) -> float:
-    """How far from a sample, in pixels, a pixel's middle can lie and still receive a share.
+    """The largest distance in pixels between a sample and the middle of a pixel that receives a share.
 
     Args:
         interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         size: pixels from one sample to the next, greater than 0.
     """
     reach = max(size, 1.0) / 2 if interpolation == "nearest" else REACH[interpolation] * size + 0.5
-    return reach + 1e-6  # a border reached by rounding is looked at, and gets the share that it deserves
+    return reach + 1e-6  # pixels reached only by rounding are included
 
 
 @dataclass(frozen=True, repr=False)
@@ -155,8 +155,8 @@ class Taps(Brief):
     """Shares as a table by pixel: pixel m gathers ``weights[..., m, n]`` of sample ``first[..., m] + n``.
 
     Args:
-        first: index of the first sample that reaches each pixel, within the samples there are.
-        weights: the shares of the samples from there on, zero where none is left.
+        first: index of the first sample that reaches each pixel, within the existing samples.
+        weights: the shares of the samples from there on, zero beyond the last.
     """
 
     first: NDArray[np.int64]
@@ -173,7 +173,7 @@ class Taps(Brief):
         """The table by sample: sample n gives ``weights[..., n, m]`` of its light to pixel ``first[..., n] + m``.
 
         Args:
-            samples: how many there are.
+            samples: number of samples.
         """
         *tables, pixels, width = self.weights.shape
         shares = self.weights.reshape(-1, pixels, width)
@@ -190,7 +190,7 @@ class Taps(Brief):
 
 
 PIXELS_AT_ONCE = 2**14
-"""Whose shares are worked out together."""
+"""Pixels whose shares are computed in one piece."""
 
 
 def taps(
@@ -208,15 +208,15 @@ def taps(
         interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
         origin: pixel coordinate of sample 0, any shape; the table has one row for each.
         step: pixels from one sample to the next.
-        samples: how many samples there are.
-        pixels: how many pixels there are.
+        samples: number of samples.
+        pixels: number of pixels.
         opening: the share of a pixel's width that is sensitive.
-        kind: of the shares.
+        kind: type of the shares.
     """
     size = abs(step)
     reach = reach_in_pixels(interpolation, size)
     origin = np.asarray(origin, dtype=np.float64)
-    # Piece by piece: a side of many pixels takes no more memory on the way than its table does.
+    # In pieces, so that temporary arrays take no more memory than the table.
     pieces = [slice(start, min(start + PIXELS_AT_ONCE, pixels)) for start in range(0, pixels, PIXELS_AT_ONCE)]
     first, count = (np.empty((*origin.shape, pixels), dtype=np.int64) for _ in range(2))
     for piece in pieces:
@@ -238,9 +238,9 @@ def taps(
 class Division(Brief):
     """Samples along one axis divided into finer ones: fine sample n takes shares of a few samples.
 
-    Fine samples stand ``1/refine`` apart, from half a footprint before the first sample to half a footprint
-    after the last; each takes φ(distance)/refine of a sample. So a sample's light is only spread, and pieces
-    of a light field divide as the whole does.
+    Fine samples are ``1/refine`` apart, from half a footprint before the first sample to half a footprint
+    after the last; each takes φ(distance)/refine of a sample. So a sample's light is only redistributed, and
+    pieces of a light field are divided as the whole is.
 
     Args:
         start: index, in samples, of fine sample 0.
@@ -254,14 +254,15 @@ class Division(Brief):
 
     @classmethod
     def of(cls, interpolation: str, samples: int, refine: int, sharpen: Array | None = None) -> Division:
-        """``samples`` samples, each divided into ``refine``, interpolated as named.
+        """Divide ``samples`` samples into ``refine`` parts each, with the given interpolation.
 
         Args:
-            interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``; by ``"box"`` linearly.
-            samples: how many there are.
+            interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``; ``"box"`` interpolates linearly.
+            samples: number of samples.
             refine: parts of each.
-            sharpen: an odd number of weights by which samples are filtered before they are interpolated; a fine
-                sample is then the mean of what is interpolated over its own cell, not its value in the middle.
+            sharpen: an odd number of weights of a filter that is applied to samples before they are
+                interpolated; a fine sample is then the mean of the interpolation over its own cell, not the
+                value in its middle.
         """
         interpolation = "linear" if interpolation == "box" else interpolation
         weights = np.ones(1) if sharpen is None else sharpen

@@ -1,4 +1,4 @@
-"""View taps: places of the aperture that views stand for, and how the cells of views are divided into them."""
+"""View taps: points of the aperture that views stand for, and how the cells of views are divided into taps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Mesh = tuple[NDArray[np.intp], ...]
 Ends = tuple[bool, bool]
-"""Whether the grid of views ends before the first view, and after the last, along one axis; else it goes on."""
+"""Whether the grid of views ends before the first view, and after the last, along one axis; else it continues."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -22,12 +22,12 @@ class CellDivision(Brief):
     """How the cells of views are divided.
 
     Args:
-        parts: of each, along each axis.
-        spread: whether a view's light reaches its neighbours, as a tent, for a place between views is interpolated
-            from both; else it stays in its own cell.
-        finer: parts of the cells of some views, where several elements vary together; ``parts`` for none.
+        parts: of each cell, along each axis.
+        spread: whether a view's light extends to its neighbours as a tent, so that places between views are
+            interpolated from both; else it stays in its own cell.
+        finer: parts of the cells of some views, in which several elements vary together; ``parts`` for none.
         where: these views, (v, u).
-        error: the error that elements varying together within parts of cells may leave, a share of the light.
+        error: remaining error of elements that vary together within parts of cells, a share of the light.
     """
 
     parts: int
@@ -44,10 +44,10 @@ class CellDivision(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Taps(Brief):
-    """Taps in rows and columns; each reads a view, at a place of its cell.
+    """Taps in rows and columns; each reads a view, at a point of its cell.
 
-    Where the cells of some views are divided more finely than those of others, rows and columns of taps have
-    levels. A tap of a row and a column of different levels has no share of the light.
+    If the cells of some views are divided more finely than those of others, rows and columns of taps have
+    levels. A tap whose row and column have different levels has no share of the light.
 
     Args:
         rows: row of views that each row of taps reads.
@@ -57,7 +57,7 @@ class Taps(Brief):
         shares: of a view's light.
         row_level: of each row of taps.
         column_level: likewise.
-        parts: of a view's cell each way, of each level.
+        parts: of a view's cell each way, for each level.
     """
 
     rows: Numbers
@@ -76,7 +76,7 @@ class Taps(Brief):
         division: CellDivision,
         ends: tuple[Ends, Ends] = ((True, True), (True, True)),
     ) -> Taps:
-        """The taps of a grid of (rows, columns) of views, which ends with these, or is a piece of a larger one."""
+        """The taps of a grid of (rows, columns) of views, which may be a piece of a larger grid."""
         (rows, down, row_share, row_level), (columns, across, column_share, column_level) = (
             _along(count, division, np.asarray(division.where.any(axis=1 - axis)), ends[axis])
             for axis, count in enumerate(views)
@@ -92,14 +92,14 @@ class Taps(Brief):
         return cls(rows, columns, index, shift, shares, row_level, column_level, parts)
 
     def levels(self) -> Iterator[tuple[Mesh, int]]:
-        """The taps of each level that has any, an open mesh of their (rows, columns), and the parts of a cell."""
+        """For each level that has taps: an open mesh of their (rows, columns), and the parts of a cell."""
         for level, parts in enumerate(self.parts):
             mesh = np.ix_(np.flatnonzero(self.row_level == level), np.flatnonzero(self.column_level == level))
             if mesh[0].size and mesh[1].size:
                 yield mesh, parts
 
     def some(self, rows: Numbers, columns: Numbers) -> Taps:
-        """Some rows and columns of them."""
+        """The taps in some rows and columns only."""
         mesh = np.ix_(rows, columns)
         return replace(
             self,
@@ -116,16 +116,16 @@ class Taps(Brief):
 def _along(
     views: int, division: CellDivision, finer: NDArray[np.bool_], ends: Ends
 ) -> tuple[Numbers, Array, Array, Numbers]:
-    """Views read, shifts from them in views, shares and levels, of the taps along one axis.
+    """Views read, shifts from them in views, shares and levels of the taps along one axis.
 
-    Undivided, each view is one tap. Divided, it is one in each part of its cell; or its light is spread over a
-    tent that reaches its neighbours, so that a place between views is interpolated linearly from both. Where the
-    grid ends, the last view's light fills its cell evenly, as there is no neighbour to interpolate with.
+    An undivided view is one tap. A divided view has one tap in each part of its cell; or its light is spread
+    over a tent that extends to its neighbours, so that a place between views is interpolated linearly from both.
+    At an end of the grid, the last view's light fills its cell uniformly because there is no neighbour.
 
     Args:
-        views: how many there are.
+        views: number of views.
         division: of their cells.
-        finer: of which of them the cells are divided further.
+        finer: for each view, whether its cell is divided further.
         ends: where the grid ends.
     """
     parts = division.parts
@@ -150,7 +150,7 @@ def _along(
             np.append(shares, np.tile(share, len(number))),
         )
         level = np.append(level, np.ones(len(view) - len(level), dtype=np.int64))
-        order = np.lexsort((shifts, level, view))  # views one after the other, as they lie in memory
+        order = np.lexsort((shifts, level, view))  # views in the order in which they lie in memory
         view, shifts, shares, level = view[order], shifts[order], shares[order], level[order]
     return view, shifts, shares, level
 

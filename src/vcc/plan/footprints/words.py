@@ -1,4 +1,4 @@
-"""What was decided about a picture by footprints, in words."""
+"""Notes and warnings of a footprint plan, as text."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
 
 TOO_MUCH = 5e-3
-"""Error, as a share of the light, from which on a picture says it; estimates are about twice what errors are."""
+"""Error, as a share of the light, above which an image carries a warning; estimates are about twice it."""
 GHOSTS = 1.5
-"""Pixels, or samples, between views' pictures of one thing from which on these are seen apart."""
+"""Distance between views' images of one object above which they are visible as separate, in pixels or samples."""
 COARSE_TEXTURE = 5e-3
-"""Error of a mask's texture between its points, as a share of its largest value, from which on a plan says it."""
+"""Error of a mask's texture between its points, as a share of its largest value, above which a plan warns."""
 
 
 def notes_of(
@@ -33,9 +33,9 @@ def notes_of(
     why_divided: str,
     swapped: bool,
 ) -> tuple[str, ...]:
-    """What was folded, pulled to the samples and to the sensor, and how finely cells are divided.
+    """Notes on the folded elements, the masks at the views, in mid-path and against the sensor, and the divisions.
 
-    ``why_divided``: what asks for parts of samples, in words.
+    ``why_divided``: the reason for dividing samples, as text.
     """
     linear = [
         element.label
@@ -84,13 +84,13 @@ def notes_of(
 
 
 def cautions_of(division: CellDivision, samples: SampleDivision, ghosts: float, pixel: float) -> tuple[str, ...]:
-    """What a picture by these cells lacks so much of that it is to be said with the picture.
+    """Warnings for errors that are large enough to be reported with the image.
 
     Args:
-        division: of views' cells.
-        samples: how these are divided.
-        ghosts: how far views' pictures of some depths stay apart, pixels; 0 where nobody asks to close gaps.
-        pixel: what views' pictures may lie apart unseen: a pixel, or a sample where it is wider.
+        division: of the views' cells.
+        samples: how samples are divided.
+        ghosts: remaining distance between views' images of some depths, pixels; 0 if gaps are not to be filled.
+        pixel: distance between views' images that stays invisible: a pixel, or a sample if it is wider.
     """
     found = []
     if ghosts > GHOSTS * pixel:
@@ -117,7 +117,7 @@ def _finer(parts: int) -> str:
 
 
 def coarse_textures(lookups: tuple[MaskLookup, ...]) -> tuple[str, ...]:
-    """Which masks are finer than their textures show, and by how much."""
+    """Warnings for masks that are finer than their textures can show, with the error of each."""
     found = [(lookup, texture_error(lookup.texture)) for lookup in lookups]
     return tuple(
         f"{lookup.label} is finer than its texture of {'×'.join(map(str, lookup.texture.shape))} points shows: "

@@ -1,1 +1,1 @@
-"""Pictures by rays: what is traced from each pixel, as plain data, and the compiler that makes it."""
+"""Images by rays: a plan of the rays to trace from each pixel, as plain data, and its compiler."""

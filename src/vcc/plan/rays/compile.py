@@ -1,4 +1,4 @@
-"""From a camera whose optics are not affine, and a light field, to a ray plan."""
+"""Compile a camera with non-affine optics, and a light field, to a ray plan."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ DEFAULT_SAMPLES = 64
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RayChoices(Brief):
-    """All that is chosen of a plan by rays.
+    """All choices of a ray plan.
 
     Args:
-        parallax: the motion along which views are interpolated (`Rays.motion`), and that in words.
+        parallax: the motion along which views are interpolated (`Rays.motion`), and a note as text.
         aim: where rays are aimed.
-        elements: of each, from the sensor on.
+        elements: choices of each element, from the sensor on.
     """
 
     parallax: tuple[Array, str]
@@ -72,10 +72,10 @@ class RayChoices(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ElementChoices(Brief):
-    """What is chosen of an element that rays meet.
+    """Choices of an element that rays meet.
 
     Args:
-        aimed_at: whether rays are aimed at the very hole that it is.
+        aimed_at: whether it is the hole at which rays are aimed.
         textures: the points of its textures, in the order in which they are made.
     """
 
@@ -88,20 +88,20 @@ def _alike(one: tuple[Points, ...], other: tuple[Points, ...]) -> bool:
 
 
 class ByRays:
-    """The stages of a plan by rays, each made once of those before it.
+    """The stages of a ray plan, each computed once from the stages before it.
 
     Args:
         train: the optics.
-        grid: of the light field. A piece of another is looked at by the rays of the whole, and gives what its
-            samples add to the picture of the whole.
-        how: what was chosen.
+        grid: of the light field. A piece of another light field is read by the rays of the whole, and its image is
+            its contribution to the image of the whole.
+        how: the options.
         reason: why rays are needed, for the plan's notes.
-        choices: by which the plan is made; None chooses now.
-        follow: whether its numbers are to follow a camera.
-        parts: what is kept of plans nearby.
+        choices: for the plan; None chooses now.
+        follow: given if the plan's parameters are to follow a camera.
+        parts: cached parts of nearby plans.
 
     Raises:
-        InputError: an element that returns what it must not (named), optics through which no bound on the rays can
+        InputError: an element that returns invalid values (named), optics for which no bound on the rays can
             be found, or choices that no longer hold.
     """
 
@@ -121,18 +121,18 @@ class ByRays:
 
     @property
     def choices(self) -> RayChoices:
-        """All that is chosen."""
+        """All choices."""
         return gathered(RayChoices, self)
 
     @property
     def linears(self) -> tuple[Linear, ...]:
-        """Which numbers of the plan are linear in what elements hold."""
+        """The parameters of the plan that are linear in parameters of elements."""
         return self.met.linears
 
     @property
     @cached
     def choose_parallax(self) -> tuple[Array, str]:
-        """The motion along which views are interpolated, and what is done with it, in words."""
+        """The motion along which views are interpolated, and a note as text."""
         self.parts.check()
         return _motion(self.grid, self.how)
 
@@ -146,27 +146,27 @@ class ByRays:
     @property
     @cached
     def choose_aim(self) -> AimChoices | None:
-        """Where rays are aimed; None: at the smallest window that there is, which is found with its numbers."""
+        """Where rays are aimed; None: at the smallest window, which is found together with its parameters."""
         self.parts.check()
         return None if self.follow is None else choose_aim(self.path)
 
     @property
     @cached
     def aimed(self) -> Aimed:
-        """Where rays are aimed, and where they meet elements then."""
+        """The aim, and the regions in which rays then meet elements."""
         return found(self.path) if self.choose_aim is None else aim_now(self.path, self.choose_aim)
 
     @property
     @cached
     def met(self) -> Met:
-        """What rays meet."""
+        """The elements that rays meet."""
         chosen = self.choose_elements if is_computed(self, "choose_elements") else None
         return steps_met(self.path, self.aimed, False, self.follow, chosen, self.parts)
 
     @property
     @cached
     def choose_elements(self) -> tuple[ElementChoices, ...]:
-        """What is chosen of each element: the points of its textures, with what they hold."""
+        """The choices of each element: the points of its textures, with their values."""
         return self.met.choices
 
     @property
@@ -203,7 +203,7 @@ class ByRays:
     @property
     @cached
     def plan(self) -> Plan:
-        """How to make the picture."""
+        """The plan of the image."""
         core, grid = self.core, self.grid
         notes = [f"rays are traced back from the sensor: {self.reason}"]
         notes += [f"they are aimed at {self.aimed.aim.words}", *self.met.notes, self.choose_parallax[1]]
@@ -228,12 +228,12 @@ class ByRays:
 
 
 def _kind(follow: Follow | None) -> type[np.floating]:
-    """Of the numbers of textures and points: in double precision where they follow a camera."""
+    """Type of the values of textures and points: double precision if they follow a camera."""
     return np.float32 if follow is None else np.float64
 
 
 def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
-    """What is done to views before rays look at them."""
+    """The operators on views before rays read them."""
     if how.interpolation != "sharp":
         return ()
     notes.append(
@@ -244,7 +244,7 @@ def _before(grid: Grid, how: How, notes: list[str]) -> tuple[Before, ...]:
 
 
 def _border(grid: Grid, core: Rays, before: tuple[Before, ...]) -> DarkBorder:
-    """As much of a dark border around a piece as its light reaches among the samples of the whole."""
+    """A dark border around a piece, as wide as its light reaches among the samples of the whole."""
     reach = max((operator.reach for operator in before), default=0)
     most = (core.border, core.border, reach, reach)
     beside = ((min(a, n), min(b, n)) for (a, b), n in zip(grid.beyond, most, strict=True))
@@ -252,13 +252,13 @@ def _border(grid: Grid, core: Rays, before: tuple[Before, ...]) -> DarkBorder:
 
 
 def _with(border: DarkBorder, block: Block) -> Block:
-    """A block of a whole with the border around it."""
+    """A block of a whole, with the border around it."""
     ends = zip(block.ranges, border.halo, strict=True)
     return Block(*((first - a, stop + b) for (first, stop), (a, b) in ends))
 
 
 def _cautions(train: Train) -> Iterator[str]:
-    """What the optics do that a picture can hardly show."""
+    """Warnings of effects that the image can hardly show."""
     pixel = max(train.sensor.pitches)
     for stage in train.stages:
         bending = stage.faces.bending
@@ -274,14 +274,14 @@ def _cautions(train: Train) -> Iterator[str]:
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """What rays meet.
+    """The elements that rays meet.
 
     Args:
-        steps: in the order in which they meet it.
-        index_from_ray: from rays behind all that to the light field's indices.
-        notes: what is to be said of it.
-        linears: which numbers of the steps are linear in what elements hold.
-        choices: what was chosen of each element, from the sensor on; none where nothing follows a camera.
+        steps: in the order in which rays meet them.
+        index_from_ray: from rays behind all steps to the light field's indices.
+        notes: for the plan.
+        linears: the parameters of the steps that are linear in parameters of elements.
+        choices: of each element, from the sensor on; none if nothing follows a camera.
     """
 
     steps: tuple[steps.Step, ...]
@@ -293,22 +293,22 @@ class Met:
 
 @dataclass(frozen=True, eq=False)
 class _Met:
-    """What is met, where, and how finely it must be known.
+    """An element that rays meet, the place where they meet it, and the accuracy that is needed.
 
     Args:
-        stage: what is met.
-        region: lowest and highest (x, y) at which it is, metres.
-        footprint: (width, height) in metres over which the rays of one pixel spread there; None where unknown.
-        index_from_slope: (4, 2), by how many samples of the light field a ray moves for a slope there; None where
-            that is not known.
-        sizes: points a side of textures for masks, and for bends.
-        passes: lowest and highest (x, y) of what passes in its plane, metres.
+        stage: of the element.
+        region: lowest and highest (x, y) at which rays meet it, metres.
+        footprint: (width, height) in metres over which the rays of one pixel spread there; None if unknown.
+        index_from_slope: (4, 2), samples of the light field by which a ray moves for a slope there; None if
+            unknown.
+        sizes: points a side of textures for masks, and for deflections.
+        passes: lowest and highest (x, y) of the opening in its plane, metres.
         chosen: points of its textures; None chooses now.
-        follow: whether its numbers are to follow a camera.
-        parts: what is kept of plans nearby.
-        points: of its textures that were made, in their order.
-        notes: what is to be said of it.
-        linears: which of its numbers are linear in what it holds.
+        follow: given if its parameters are to follow a camera.
+        parts: cached parts of nearby plans.
+        points: of the textures that were made, in order.
+        notes: for the plan.
+        linears: its parameters that are linear in parameters of the element.
     """
 
     stage: Stage
@@ -329,7 +329,7 @@ class _Met:
         return self.stage.element.label
 
     def texture(self, sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> tuple[steps.Texture, float]:
-        """The next of its textures, fine enough, and its error; see `made_fine_enough`."""
+        """The next of its textures, fine enough, and the texture's error; see `made_fine_enough`."""
         if self.follow is None:
             return made_fine_enough(sampled, sizes, enough)
         number = len(self.points)
@@ -346,15 +346,15 @@ def steps_met(
     chosen: tuple[ElementChoices, ...] | None = None,
     parts: Parts = NONE_KEPT,
 ) -> Met:
-    """What rays meet on a path.
+    """The elements that rays meet on a path.
 
     Args:
         path: from the sensor.
-        taken: where they are aimed.
-        coarse: takes the coarsest textures, for a share of light rather than for a picture.
-        follow: whether numbers are to follow a camera.
-        chosen: of each element; None chooses now.
-        parts: what is kept of plans nearby.
+        taken: the aim.
+        coarse: use the coarsest textures, for a share of light rather than for an image.
+        follow: given if parameters are to follow a camera.
+        chosen: choices of each element; None chooses now.
+        parts: cached parts of nearby plans.
     """
     sizes = (COARSE_SIZES[:1], SIZES[:1]) if coarse else (COARSE_SIZES, SIZES)
     made: list[steps.Step] = []
@@ -395,9 +395,9 @@ def steps_met(
 
 
 def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
-    """Whether the leg's stop is the very disc aimed at, which lets all rays pass that are aimed at it.
+    """Whether the leg's stop is the disc aimed at, so that all aimed rays pass it.
 
-    Elements without names in one plane have one label, so that the disc itself counts too.
+    Unnamed elements in one plane share one label, so the disc itself is compared too.
     """
     pattern, element = leg.stage.faces.pattern, leg.stage.element
     if not (isinstance(aim, Window) and aim.disc and aim.words == element.label and isinstance(pattern, Circle)):
@@ -410,7 +410,7 @@ def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
 
 
 def _transmission(pattern: Pattern, met: _Met) -> list[steps.Step]:
-    """The steps by which a pattern weighs rays."""
+    """The steps that weight rays by a pattern."""
     decentre, label = met.stage.element.decentre, met.label
     if isinstance(pattern, Open):
         return []
@@ -499,7 +499,7 @@ def _scatter(scatter: Scatter, column: int, met: _Met) -> steps.Unscatter:
 
 
 def _sheet(given: object, met: _Met) -> steps.Texture:
-    """A map over a sheet as a texture: as it is where it is one, else sampled."""
+    """A map over a sheet as a texture: used directly if it is an array, else sampled."""
     decentre = met.stage.element.decentre
     if isinstance(given, SheetMap):
         values = np.moveaxis(given.values, 0, -1) if given.values.ndim == 3 else given.values[..., None]
@@ -524,7 +524,7 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
 
 
 def _motion(grid: Grid, how: How) -> tuple[Array, str]:
-    """How a point of the scene's middle depth moves from view to view, and what is done with it, in words."""
+    """The motion of a point at the scene's middle depth from view to view, and a note as text."""
     if how.between_views == "none":
         kept = "each view stands for its cell of the aperture; views are not interpolated, as asked"
         return np.zeros((2, 2)), kept

@@ -1,13 +1,13 @@
-"""Rays: a plan's core where optics do not fold, which traces rays back from the sensor.
+"""Rays: a plan's core if the optics do not fold, which traces rays back from the sensor.
 
-For cameras whose optics do not fold into one matrix (arrays, plates, diffusers) the irradiance at a place x of
+For cameras whose optics do not fold into one matrix (arrays, plates, diffusers), the irradiance at a place x of
 the sensor is the integral over the slopes at which light arrives,
 
     I(x) = ∫∫ L(ray traced back to the light field) · Π T ds dt,
 
-and a pixel holds the mean over its sensitive area. Both integrals are taken at once by a fixed number of rays a
-pixel, spread evenly (a scrambled Sobol' sequence) over the pixel, over the part of the optics that its light can
-come through (the aim) and over what diffusers do. The engine knows nothing of optics.
+and a pixel's value is the mean over its sensitive area. Both integrals are estimated together by a fixed number of
+rays a pixel, spread evenly (a scrambled Sobol' sequence) over the pixel, over the part of the optics through which
+light can arrive (the aim) and over the scattering of diffusers. The engine needs no optics.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ Cell = tuple[NDArray[np.int64], NDArray[np.int64]]
 
 
 LEAST_ROWS = 8
-"""Rows of pixels that a band of the views has at least: at its borders rays are traced for two bands."""
+"""Smallest number of rows of pixels in a band of the views: at its borders rays are traced for two bands."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rays(Value):
-    """How rays traced back from a sensor make a picture of a light field.
+    """Rays traced back from a sensor that make an image of a light field.
 
     Args:
-        raster_shape: (rows, columns) of the picture.
+        raster_shape: (rows, columns) of the image.
         first_pixel: place (x, y) of the middle of pixel (0, 0), metres.
         pitch: distance between pixels along (x, y), metres.
         sensitive: size (x, y) of a pixel's sensitive area, metres.
-        aim: which slopes are traced.
-        steps: what a ray meets, from the sensor on.
+        aim: the slopes to trace.
+        steps: the elements that a ray meets, from the sensor on.
         index_from_ray: from rays at the end of the steps to indices (i, j, k, l) of the light field.
         motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
         between_views: interpolate between views along the motion; else each view is its cell.
@@ -55,7 +55,7 @@ class Rays(Value):
         samples: rays a pixel, a power of two (through an array: through each cell).
         seed: of the choice of points for each pixel.
         points: the table, (`TABLE`, columns) float32: place in the pixel (0 … 1, twice), place in the window
-            (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then what diffusers need.
+            (0 … 1, twice, in `DIGITS` binary digits; of a disc −1 … 1), then the numbers for diffusers.
     """
 
     raster_shape: tuple[int, int]
@@ -75,20 +75,21 @@ class Rays(Value):
 
     method: ClassVar[str] = "rays"
     border: ClassVar[int] = 1
-    """Views around a block that a ray may look at with it."""
+    """Views around a block that a ray may read with it."""
 
     def part(self, block: Block) -> Rays:
-        """The same rays, looking at a block of the light field; what all blocks give adds up to the picture."""
+        """The same rays for a block of the light field; the results of all blocks add up to the image."""
         (row, _), (column, _), (l, _), (k, _) = block.ranges
         place = Affine.translation(-column, -row, -k, -l)
         return replace(self, index_from_ray=place @ self.index_from_ray, views=block.shape)
 
     def required(self, wanted: Collection[str]) -> set[str]:
-        """The numbers of a part to which derivatives make up those to some of this core's numbers: the same."""
+        """The parameters of a part whose derivatives are needed for the given parameters of this core: the
+        same."""
         return set(wanted)
 
     def full_gradients(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
-        """Derivatives to the numbers of `part` as those to this core's own: it only looks from elsewhere."""
+        """Derivatives to this core's parameters from derivatives to those of `part`: they are equal."""
         return dict(numbers)
 
     def scaled(self, factor: float) -> Rays:
@@ -96,13 +97,13 @@ class Rays(Value):
         return self if factor == 1 else replace(self, scale=self.scale * factor)
 
     def more(self, samples: int) -> Rays:
-        """With so many rays a pixel, to be taken beside as many that there are."""
+        """The core with ``samples`` rays a pixel, which are taken in addition to equally many."""
         return replace(self, samples=samples)
 
     @property
     @cached
     def reach(self) -> Reach | None:
-        """How far rays reach, where all that they meet is affine and x and y do not mix; else None."""
+        """The range of rays if all that they meet is affine and x and y do not mix; else None."""
         matrix = index_from_sensor(self.aim, self.steps, self.index_from_ray, self.motion)
         if matrix is None:
             return None
@@ -111,7 +112,7 @@ class Rays(Value):
         return Reach(matrix, self.aim, self.motion, *pixels)
 
     def used_views(self, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-        """Those between which rays pass, where that is known; all, too, where none is."""
+        """The views between which rays pass, if known; otherwise, or if there are none, all."""
         used = np.ones(shape[:2], dtype=bool)
         if (reach := self.reach) is not None:
             (left, right), (top, bottom) = reach.views(0), reach.views(1)
@@ -120,7 +121,7 @@ class Rays(Value):
         return used if used.any() else np.ones(shape[:2], dtype=bool)
 
     def used_pixels(self, shape: tuple[int, ...]) -> NDArray[np.intp]:
-        """Those between which rays look views up, where that is known, or else all."""
+        """The pixels between which rays look up views, if known; otherwise all."""
         pixels = np.zeros((*shape[:2], 2, 2), dtype=np.intp)
         pixels[..., 1] = shape[2:4]
         if (reach := self.reach) is not None:
@@ -136,8 +137,8 @@ class Rays(Value):
 
     @property
     def bands(self) -> int:
-        """Into how many bands of rows of pixels the views may be cut, each of which a part of the rays looks at; 1
-        where that is not known."""
+        """The number of bands of rows of pixels into which the views may be cut, each read by a part of the
+        rays; 1 if unknown."""
         if (reach := self.reach) is None:
             return 1
         row = np.array([0, self.raster_shape[0] - 1])
@@ -149,12 +150,12 @@ class Rays(Value):
 
     @property
     def rays(self) -> int:
-        """How many rays are aimed at one cell or window, over all pixels."""
+        """Number of rays aimed at one cell or window, over all pixels."""
         return self.raster_shape[0] * self.raster_shape[1] * self.samples
 
     @property
     def most_cells(self) -> int:
-        """Through how many cells of an array a pixel's rays may go; 1 for a window."""
+        """Largest number of cells of an array through which a pixel's rays may pass; 1 for a window."""
         if not isinstance(self.aim, CellWindows):
             return 1
         down, across = self.aim.reach
@@ -162,23 +163,23 @@ class Rays(Value):
 
     @property
     def samples_touched(self) -> int:
-        """How many samples of the light field the rays look at, those that are looked at twice counted twice."""
+        """Number of samples of the light field that the rays read, repeated reads counted repeatedly."""
         return 16 * self.rays
 
     @property
     def tables_bytes(self) -> int:
-        """Bytes of what the steps look up."""
+        """Bytes of the look-up tables of the steps."""
         return int(sum(table.nbytes for table in self.packed().arrays()))
 
     def block(self, pixel: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Which aligned block of ``samples`` points each pixel takes, by a hash of its number and the seed.
+        """The aligned block of ``samples`` points for each pixel, by a hash of its number and the seed.
 
-        By the hash's leading bits: the block of twice the size is the one that this block is half of.
+        The hash's leading bits are used, so that the block of twice the size contains this block.
         """
         return (hashed(pixel, self.seed).astype(np.int64) * (TABLE // self.samples)) >> 32
 
     def looked_up(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Where the rays of pixels meet the light field, and what they weigh.
+        """Places where the rays of pixels meet the light field, and their weights.
 
         Args:
             pixel: numbers of pixels, row · columns + column, (pixels,).
@@ -187,24 +188,24 @@ class Rays(Value):
         Returns:
             indices (i, j, k, l) of the light field, (pixels, cells, samples, 4), and shares of solid angle in
             units of slope squared, (pixels, cells, samples); their sum over a pixel is its irradiance under
-            radiance 1. The first half of the samples is as good a set as the second.
+            radiance 1. The first half of the samples is statistically equivalent to the second.
         """
         rays = self.traced(pixel, block)
         return self.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1)), rays.share
 
     def traced(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> Bundle:
-        """The rays of pixels where the light field's frame stands, after all steps; see `looked_up`."""
+        """The rays of pixels in the plane of the light field's frame, after all steps; see `looked_up`."""
         rays, _ = self.aimed(pixel, block)
         for step in self.steps:
             step(rays)
         return rays
 
     def aimed(self, pixel: NDArray[np.int64], block: NDArray[np.int64]) -> tuple[Bundle, Cell | None]:
-        """The rays of pixels at the sensor, and (row, column) of the cells aimed through, (pixels, cells, 1) each.
+        """The rays of pixels at the sensor, and (row, column) of the cells aimed at, (pixels, cells, 1) each.
 
         Args:
             pixel: as for `looked_up`.
-            block: likewise.
+            block: as for `looked_up`.
         """
         number = block[:, None] * self.samples + np.arange(self.samples)
         points = self.points[number][:, None]  # (pixels, 1, samples, columns)
@@ -216,7 +217,7 @@ class Rays(Value):
         if isinstance(self.aim, CellWindows):
             cell_row, cell_column = self.aim.around(middle_x, middle_y)
             cells = cell_row[..., None], cell_column[..., None]
-            # What is drawn for a pixel differs from cell to cell.
+            # Each cell of a pixel has its own random numbers.
             cell = hashed(cell_row * 65537 + cell_column, self.seed).astype(np.int64)
             points = self._moved(points, pixel[:, None] ^ cell)
         else:
@@ -232,20 +233,20 @@ class Rays(Value):
         return Bundle(x, y, s, t, weight / self.samples, points), cells
 
     def inside(self, index: Array) -> NDArray[np.bool_]:
-        """Which rays, by indices (…, 4) of the light field, fall into the grid of views."""
+        """Whether rays, given by indices (…, 4) of the light field, fall into the grid of views."""
         nv, nu = self.views[:2]
         i, j = index[..., 0], index[..., 1]
         return np.asarray((i >= -0.5) & (i <= nu - 0.5) & (j >= -0.5) & (j <= nv - 0.5))
 
     def _moved(self, points: NDArray[np.float32], number: NDArray[np.int64]) -> Array:
-        """Points (pixels, 1, samples, columns), moved by what is drawn for each number (pixels, cells).
+        """Points (pixels, 1, samples, columns), randomized by a hash of each number (pixels, cells).
 
         Returns (pixels, cells, samples, columns): places in the pixel −½ … ½, in the window −1 … 1.
 
-        There are fewer blocks than pixels: pixels with one block would err alike, and an even surface would show
-        it. So each pixel flips digits of its own in all of its points: boxes with sides of powers of ½ change
-        places as wholes, so that the points stay as even as they were, and none crosses from one border to the
-        other, where what is seen may jump (a digital shift; Owen 1995). A disc is turned.
+        There are fewer blocks than pixels: pixels with the same block would have the same error, which would be
+        visible on a uniform surface. So each pixel flips its own digits in all of its points (a digital shift;
+        Owen 1995). Boxes with sides of powers of ½ change places as wholes, so that the points stay as even as
+        before, and no box crosses from one border to the other, where the integrand may jump. A disc is rotated.
         """
         points = np.broadcast_to(points, (*number.shape, *points.shape[2:]))
         moved = points.astype(np.float64)
@@ -266,7 +267,7 @@ class Rays(Value):
 
     @property
     def met(self) -> str:
-        """What rays meet on their way back from the sensor, in words."""
+        """The elements that rays meet on their way back from the sensor, as text."""
         met = [step.words for step in self.steps if not isinstance(step, Move)]
         return ", ".join(dict.fromkeys(met)) or "nothing"
 

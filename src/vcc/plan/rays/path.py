@@ -1,4 +1,4 @@
-"""A camera from the sensor back to the light field: what rays meet on their way, and what of it bounds them."""
+"""A camera from the sensor back to the light field: the elements that rays meet, and their bounds."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
 Array = NDArray[np.float64]
 
 STEEPEST = 1.0
-"""Slope of 45°: what lets steeper light pass does not bound the light of a camera."""
+"""Slope of 45°: a stop that transmits steeper light does not bound the light of a camera."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Leg(Brief):
-    """A stage, the way from behind it to the sensor undone, and the stop in its plane.
+    """A stage, the map from behind it to the next stage undone, and the stop in its plane.
 
     Args:
         number: 0 for the stage nearest to the sensor.
-        stage: what is met.
-        undone: rays just behind it from rays just behind what comes after it (or on the sensor), lenses and prisms
-            there undone.
-        from_sensor: rays just behind it from rays on the sensor, through affine optics alone.
-        stop: (low x, low y), (high x, high y) of what passes in this plane, infinite where nothing bounds it.
+        stage: that rays meet.
+        undone: rays just behind it from rays just behind the following stage (or on the sensor), with the lens or
+            prism there undone.
+        from_sensor: rays just behind it from rays on the sensor, through affine optics only.
+        stop: (low x, low y), (high x, high y) of the opening in this plane, infinite if nothing bounds it.
         column: of the table of points, where the numbers of its diffuser begin.
     """
 
@@ -45,15 +45,15 @@ class Leg(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Path(Brief):
-    """A camera from the sensor back to the light field, and what bounds its rays.
+    """A camera from the sensor back to the light field, and the bounds of its rays.
 
     Args:
         train: whose elements rays meet.
-        grid: that they end in.
-        motion: 2×2, along which they are interpolated between views (`Rays.motion`).
+        grid: in which rays end.
+        motion: 2×2, along which views are interpolated (`Rays.motion`).
         samples: rays a pixel.
-        rounds: which stops, by the number of their leg, are taken for round when they are widened by how far rays
-            stray; None: those that are smaller so.
+        rounds: for each leg, whether its stop stays round when it is widened by the deviation of rays; None: if
+            the round one is smaller.
     """
 
     train: Train
@@ -79,7 +79,7 @@ class Path(Brief):
     @property
     @cached
     def scatters(self) -> tuple[Scatter, ...]:
-        """All that scatters rays, in the order in which they meet it."""
+        """All scatterers, in the order in which rays meet them."""
         met = (stage.faces.spread for stage in reversed(self.train.stages))
         return tuple(spread for spread in met if spread is not None)
 
@@ -104,13 +104,13 @@ class Path(Brief):
     @property
     @cached
     def index_from_sensor(self) -> Affine:
-        """Indices (i, j, k, l) of the light field from rays on the sensor, through affine optics alone."""
+        """Indices (i, j, k, l) of the light field from rays on the sensor, through affine optics only."""
         return self.index_from_entrance @ self._entrance_from_sensor
 
     def index_from_slope(self, leg: Leg) -> Array | None:
-        """(4, 2): by how many samples of the light field a ray moves for a slope (s, t) behind a leg.
+        """(4, 2): samples of the light field by which a ray moves for a slope (s, t) behind a leg.
 
-        None where that is not known: where something beyond it bends otherwise than lenses and prisms do.
+        None if unknown: if an element beyond it, other than lenses and prisms, bends rays.
         """
         if any(beyond.stage.faces.bending is not None for beyond in self.legs[leg.number + 1 :]):
             return None
@@ -123,16 +123,16 @@ class Path(Brief):
 
     @property
     def size(self) -> Array:
-        """How many samples there are along (i, j, k, l)."""
+        """Number of samples along (i, j, k, l)."""
         nv, nu, nt, ns = self.grid.shape[:4]
         return np.array([nu, nv, ns, nt], dtype=np.float64)
 
     @property
     def finds(self) -> Array:
-        """Half of what finds light along each of (i, j, k, l).
+        """Half the range in which rays find light along each of (i, j, k, l).
 
-        Half a cell beyond the border of a view linear interpolation has faded to nothing, and the views on both
-        sides of a ray are looked at up to one view's motion away.
+        Linear interpolation fades to zero half a cell beyond the border of a view, and the views on both sides
+        of a ray are read up to one view's motion away.
         """
         faded = np.concatenate([np.zeros(2), 0.5 + np.abs(self.motion).sum(axis=1)])
         return np.asarray(self.size / 2 + faded)
@@ -140,10 +140,10 @@ class Path(Brief):
     @property
     @cached
     def stops_bound(self) -> bool:
-        """Whether stops bound the slopes of rays, so that they say which light is wanted, not the grid of views.
+        """Whether stops bound the slopes of rays, so that they rather than the grid of views define the aperture.
 
-        A stop so near the sensor that slopes of more than `STEEPEST` pass it bounds nothing that paraxial optics
-        could speak of.
+        A stop so near the sensor that slopes of more than `STEEPEST` pass it is not a bound within paraxial
+        optics.
         """
         return any(map(_bounds_slopes, self.legs))
 
@@ -163,25 +163,25 @@ def mixes_axes(ray_map: Affine) -> bool:
 
 
 def _undone(stage: Stage) -> Affine:
-    """Rays just behind the stage before from rays just behind this one, its lens or prism undone."""
+    """Rays just behind the previous stage from rays just behind this one, with its lens or prism undone."""
     approach = stage.approach.inverse()
     return approach if stage.centred is None else approach @ stage.centred.inverse()
 
 
 def in_one_plane(stages: tuple[Stage, ...]) -> list[int]:
-    """The numbers of stages that stand in the plane of the one before."""
+    """The numbers of stages in the same plane as the stage before."""
     return [n for n, stage in enumerate(stages) if n and np.array_equal(stage.approach.matrix, np.eye(5))]
 
 
 def stops_in_one_plane(stages: tuple[Stage, ...]) -> tuple[int, ...]:
-    """The same, where any of them stops light."""
+    """The same if any of them stops light, else none."""
     same = in_one_plane(stages)
     stops = any(stages[m].faces.pattern is not None for n in same for m in (n - 1, n))
     return tuple(same) if stops else ()
 
 
 def _stops(stages: tuple[Stage, ...]) -> list[tuple[Array, Array]]:
-    """For each stage what passes in its plane: bounded by all that stands in that plane."""
+    """For each stage the opening in its plane: bounded by all stages in that plane."""
     stops, same = [_own_stop(stage) for stage in stages], in_one_plane(stages)
     for n in [*same, *reversed(same)]:  # forwards, then backwards
         low = np.maximum(stops[n][0], stops[n - 1][0])

@@ -1,8 +1,8 @@
 """Steps of a ray on its way back from the sensor to the light field, as plain data.
 
-A ray travels against the light: from a place on the sensor through what the camera holds, last first, to the
-entrance plane. Each class is one step and says twice what it does: as a function on NumPy bundles of rays, which
-defines what is correct, and as numbers (`packed`) for the compiled kernel, which knows these steps by ``code``.
+A ray travels against the light: from a place on the sensor through the camera's elements, last first, to the
+entrance plane. Each class is one step, defined twice: as a function on NumPy bundles of rays, which
+defines the correct result, and as numbers (`packed`) for the compiled kernel, which selects steps by ``code``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 class Bundle(Brief):
     """Rays in one plane: places x, y in metres, slopes s, t, and the share of light that each carries.
 
-    ``points`` holds the numbers that belong to each ray, (..., columns of the plan's table).
+    ``points`` are the random numbers of each ray, (..., columns of the plan's table).
     """
 
     x: Array
@@ -38,7 +38,7 @@ class Bundle(Brief):
 
 
 class Packer:
-    """Collects the numbers of steps for the compiled kernel: small ones by step, tables one after another."""
+    """Collects the numbers of steps for the compiled kernel: short lists by step, and tables concatenated."""
 
     def __init__(self) -> None:
         self.codes: list[int] = []
@@ -49,25 +49,25 @@ class Packer:
         self._places = {"shares": 0, "slopes": 0}
 
     def step(self, code: int, whole: list[int], real: list[float]) -> None:
-        """One step's own numbers."""
+        """Add the numbers of one step."""
         self.codes.append(code)
         self.whole.append(whole)
         self.real.append(real)
 
     def shares(self, table: NDArray[np.float32]) -> int:
-        """Where a table of shares (float32) will begin."""
+        """Add a table of shares (float32); return its start."""
         self._shares.append(np.ascontiguousarray(table, dtype=np.float32).reshape(-1))
         self._places["shares"] += table.size
         return self._places["shares"] - table.size
 
     def slopes(self, table: Array) -> int:
-        """Where a table of slopes (float64) will begin."""
+        """Add a table of slopes (float64); return its start."""
         self._slopes.append(np.ascontiguousarray(table, dtype=np.float64).reshape(-1))
         self._places["slopes"] += table.size
         return self._places["slopes"] - table.size
 
     def arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array, NDArray[np.float32], Array]:
-        """(codes, whole numbers, real numbers, shares, slopes) as the kernel takes them."""
+        """(codes, integers, real numbers, shares, slopes) as the kernel expects them."""
         whole = np.zeros((len(self.codes), max((len(row) for row in self.whole), default=1) or 1), dtype=np.int64)
         real = np.zeros((len(self.codes), max((len(row) for row in self.real), default=1) or 1))
         for n, (whole_row, real_row) in enumerate(zip(self.whole, self.real, strict=True)):
@@ -79,27 +79,27 @@ class Packer:
 
 
 def _one_after_another(tables: list[Any]) -> Any:
-    """Tables in one array; a single one, often large, is not copied."""
+    """Tables concatenated into one array; a single one, often large, is not copied."""
     return tables[0] if len(tables) == 1 else np.concatenate(tables)
 
 
 class Step(Protocol):
-    """What every step can do."""
+    """Interface of all steps."""
 
     @property
     def words(self) -> str:
-        """The step in a few words."""
+        """The step as text."""
 
     def __call__(self, rays: Bundle) -> None:
-        """Take rays one step back."""
+        """Move rays one step back."""
 
     def packed(self, packer: Packer) -> None:
-        """Hand the step's numbers to the compiled kernel."""
+        """Add the step's numbers for the compiled kernel."""
 
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """All affine optics and free flight between two planes, undone."""
+    """Inverse of all affine optics and free flight between two planes."""
 
     before_from_behind: Affine
     words: str = "moved"
@@ -115,7 +115,7 @@ class Move:
         )
 
     def packed(self, packer: Packer) -> None:
-        """Twelve numbers where x and y do not mix, else twenty."""
+        """Twelve numbers if x and y do not mix, else twenty."""
         m = self.before_from_behind.matrix
         if m[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any():
             packer.step(self.code_mixed, [], m[:4].reshape(-1).tolist())
@@ -138,7 +138,7 @@ def _lattice_numbers(lattice: Lattice, decentre: tuple[float, float]) -> tuple[i
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellsUnbend(Brief):
-    """Lenslets and prisms, each cell its own: slopes lose what the cells added to them."""
+    """Inverse of the deflection by lenslets and prisms, which may differ from cell to cell."""
 
     lattice: Lattice
     decentre: tuple[float, float]
@@ -148,7 +148,7 @@ class CellsUnbend(Brief):
     code: ClassVar[int] = 2
 
     def __call__(self, rays: Bundle) -> None:
-        """Undo the deflection of the cells that hold the rays."""
+        """Undo the deflection of the cells that the rays meet."""
         row, column = self.cell_of(rays.x, rays.y)
         centre_x, centre_y = self.lattice.centre_of(row, column)
         kind = row % self.powers.shape[0], column % self.powers.shape[1]
@@ -156,7 +156,7 @@ class CellsUnbend(Brief):
         rays.t = rays.t + self.powers[kind] * (rays.y - self.decentre[1] - centre_y) - self.slopes[(*kind, 1)]
 
     def cell_of(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of the cell that holds each place."""
+        """(row, column) of the cell at each place."""
         return self.lattice.cell_of(x - self.decentre[0], y - self.decentre[1])
 
     def packed(self, packer: Packer) -> None:
@@ -197,7 +197,7 @@ class CellGaps:
 
 @dataclass(frozen=True, eq=False)
 class BlockOfCells:
-    """A block of cells of a lattice, from cell (0, 0) on, opaque outside it."""
+    """A block of cells of a lattice, beginning with cell (0, 0), opaque outside."""
 
     lattice: Lattice
     decentre: tuple[float, float]
@@ -219,7 +219,7 @@ class BlockOfCells:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FacetsUnbend(Brief):
-    """Plane facets that meet in the middle: slopes lose what the facets added to them."""
+    """Inverse of the deflection by plane facets that meet in the middle."""
 
     directions: Array
     slopes: Array
@@ -234,7 +234,7 @@ class FacetsUnbend(Brief):
         rays.t = rays.t - self.slopes[facet, 1]
 
     def facet_of(self, x: Array, y: Array) -> NDArray[np.int64]:
-        """The number of the facet that holds each place."""
+        """The number of the facet at each place."""
         x, y = x - self.decentre[0], y - self.decentre[1]
         outward = x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1]
         return np.asarray(np.argmax(outward, axis=-1))
@@ -247,7 +247,7 @@ class FacetsUnbend(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Texture(Brief):
-    """Numbers at regular points of a plane, interpolated linearly and held beyond the border.
+    """Numbers at regular points of a plane, interpolated linearly, and constant beyond the border.
 
     Args:
         values: (rows, columns, numbers).
@@ -277,7 +277,7 @@ class Texture(Brief):
 
 @dataclass(frozen=True, eq=False)
 class TextureUnbend:
-    """A phase plate or any function of position, as a texture: slopes lose what it added to them."""
+    """Inverse of the deflection by a phase plate or any function of position, as a texture."""
 
     texture: Texture
     words: str
@@ -334,7 +334,7 @@ class Rectangle:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellShares(Brief):
-    """A mask of uniform rectangular cells, opaque outside them, with its sharp edges."""
+    """A mask of uniform rectangular cells with sharp edges, opaque outside."""
 
     values: NDArray[np.float32]
     corner: tuple[float, float]
@@ -343,12 +343,13 @@ class CellShares(Brief):
     code: ClassVar[int] = 8
 
     def __call__(self, rays: Bundle) -> None:
-        """Weigh rays by the cell that they meet."""
+        """Weight rays by the cell that they meet."""
         row, column, inside = self.cell_of(rays.x, rays.y)
         rays.share = rays.share * np.where(inside, self.values[row, column], 0.0)
 
     def cell_of(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """(row, column) of the cell that holds each place, or of one at the border, and whether one does."""
+        """(row, column) of the cell at each place, or of the nearest cell at the border, and whether the place
+        is inside."""
         rows, columns = self.values.shape
         column = np.floor((x - self.corner[0]) / self.size[0]).astype(np.int64)
         row = np.floor((y - self.corner[1]) / self.size[1]).astype(np.int64)
@@ -356,7 +357,7 @@ class CellShares(Brief):
         return np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1), inside
 
     def packed(self, packer: Packer) -> None:
-        """The cells, where the first begins and how large they are."""
+        """The cells, the place of the first one and their size."""
         table = packer.shares(self.values)
         packer.step(self.code, [*self.values.shape, table], [*self.corner, 1 / self.size[0], 1 / self.size[1]])
 
@@ -369,8 +370,8 @@ class Cosines:
         middle: place (x, y) of the mask, metres.
         frequency: (x, y) of the first cosines, radians per metre; 0 along an axis without any.
         phase: of the first cosines, radians.
-        harmonics: how many cosines.
-        words: for people.
+        harmonics: number of cosines.
+        words: text for notes.
     """
 
     middle: tuple[float, float]
@@ -381,7 +382,7 @@ class Cosines:
     code: ClassVar[int] = 12
 
     def __call__(self, rays: Bundle) -> None:
-        """Weigh rays by ½ + Σ cos(nθ)/2h along each axis."""
+        """Weight rays by ½ + Σ cos(nθ)/2h along each axis."""
         orders = np.arange(1, self.harmonics + 1)
         for place, middle, frequency in zip((rays.x, rays.y), self.middle, self.frequency, strict=True):
             if frequency > 0:
@@ -390,20 +391,20 @@ class Cosines:
                 rays.share = rays.share * (0.5 + total / (2 * self.harmonics))
 
     def packed(self, packer: Packer) -> None:
-        """Middle, frequencies, phase, and how many cosines."""
+        """Middle, frequencies, phase, and number of cosines."""
         packer.step(self.code, [self.harmonics], [*self.middle, *self.frequency, self.phase])
 
 
 @dataclass(frozen=True, eq=False)
 class TextureShares:
-    """A mask of any other form, as a texture of means over its own points."""
+    """A mask of any other form, as a texture of means around its points."""
 
     texture: Texture
     words: str
     code: ClassVar[int] = 9
 
     def __call__(self, rays: Bundle) -> None:
-        """Weigh rays by the mask."""
+        """Weight rays by the mask."""
         rays.share = rays.share * self.texture(rays.x, rays.y)[..., 0]
 
     def packed(self, packer: Packer) -> None:
@@ -414,15 +415,15 @@ class TextureShares:
 
 @dataclass(frozen=True, eq=False)
 class Unscatter:
-    """A diffuser: each ray came in along one of the ways that its kernel allows, evenly picked.
+    """A diffuser: each ray arrived with one of the deflections that its kernel allows, sampled evenly.
 
     Args:
-        column: of the table, where the first kernel's (δs, δt) stand; the others follow.
-        kernels: how many kernels there are.
-        pick: column of the number, 0 to 1, that picks the kernel; −1 where there is one.
-        cumulative: running sums of the kernels' shares over the surface, (rows, columns, kernels), or None.
+        column: of the table, where the first kernel's (δs, δt) begin; the other kernels follow.
+        kernels: number of kernels.
+        pick: column of the number, 0 to 1, that selects the kernel; −1 if there is only one.
+        cumulative: cumulative sums of the kernels' shares over the surface, (rows, columns, kernels), or None.
         width: factor by which kernels are stretched over the surface, (rows, columns, 1), or None.
-        words: for people.
+        words: text for notes.
     """
 
     column: int
@@ -434,21 +435,21 @@ class Unscatter:
     code: ClassVar[int] = 10
 
     def __call__(self, rays: Bundle) -> None:
-        """Take from each ray's slopes what the diffuser added to it."""
+        """Subtract the diffuser's deflection from each ray's slopes."""
         place = self.column + 2 * self.kernel_of(rays)
         stretch = 1.0 if self.width is None else self.width(rays.x, rays.y)[..., 0]
         rays.s = rays.s - stretch * np.take_along_axis(rays.points, place[..., None], -1)[..., 0]
         rays.t = rays.t - stretch * np.take_along_axis(rays.points, place[..., None] + 1, -1)[..., 0]
 
     def kernel_of(self, rays: Bundle) -> NDArray[np.int64]:
-        """The number of the kernel that is picked for each ray."""
+        """The number of the kernel that is selected for each ray."""
         if self.cumulative is None:
             return np.zeros(rays.x.shape, dtype=np.int64)
         picked = rays.points[..., self.pick, None] >= self.cumulative(rays.x, rays.y)[..., :-1]
         return np.asarray(picked.sum(axis=-1))
 
     def packed(self, packer: Packer) -> None:
-        """Columns of the table, and the two textures, of no points where there is none."""
+        """Columns of the table, and the two textures, with zero points for a missing one."""
         whole: list[int] = [self.column, self.kernels, self.pick]
         real: list[float] = []
         for texture in (self.cumulative, self.width):
