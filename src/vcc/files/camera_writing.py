@@ -229,9 +229,7 @@ class Writer(Brief):
         raise InputError(f"the {family.noun} of {self.label} is {said} or sample it on a grid: {family.way_out}")
 
     def plain_array(self, values: NDArray[np.float64], source: str) -> Any:
-        """The source file if it holds the same array, "mura" and its prime for a MURA, else the name of a new
-        file.
-        """
+        """The source file if it holds the same array, a table for a MURA, else the name of a new file."""
         if source and self.holds(source, values):
             return source
         size = len(values)
