@@ -88,7 +88,7 @@ class StoredLightField(OnGrid):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the path only: the receiver opens the store itself."""
+        """Pickle path and attributes: the receiver opens the store itself."""
         stated = None if self.held is None else self.held.attributes
         return _opened_elsewhere, (self.path.absolute(), self.attributes, stated)
 
