@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from vcc.optics import LensArray as LensArray
     from vcc.optics import Louvre as Louvre
     from vcc.optics import Mask as Mask
+    from vcc.optics import Microlens as Microlens
     from vcc.optics import PhasePlate as PhasePlate
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
@@ -69,6 +70,7 @@ _HOMES = {
     "LightField": "vcc.light_field",
     "Louvre": "vcc.optics",
     "Mask": "vcc.optics",
+    "Microlens": "vcc.optics",
     "MovingCamera": "vcc.motion",
     "PhasePlate": "vcc.optics",
     "Prism": "vcc.optics",

@@ -15,7 +15,7 @@ from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
-from vcc.image import Image
+from vcc.image import Image, PhotodiodeImage
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
 from vcc.optics.focusing import focused_train
@@ -242,7 +242,9 @@ class Camera(Train):
                 ``engine``, ``threads``, ``memory_limit``; `vcc.How` says what each of them is.
 
         Returns:
-            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
+            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted). Of a
+            sensor with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of
+            each in ``photodiodes[row][column]``.
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
@@ -264,12 +266,32 @@ class Camera(Train):
         """
         check_is_light_field(light_field)
         chosen = How.of(how, options)
+        if self.sensor.photodiodes != (1, 1):
+            return self._of_photodiodes(light_field, chosen, plan, executor, progress)
         cautions = Cautions(self, light_field.grid)
         _warn_of(cautions.before())
         plan = self._planned(light_field, chosen, plan, options, progress)
         found = drive(plan, light_field, chosen, progress, executor)
         _warn_of(cautions.of(plan, light_field, found, chosen))
         return self._image(found)
+
+    def _of_photodiodes(
+        self, light_field: Samples, how: How, plan: Plan | None, executor: Any, progress: Progress | None
+    ) -> PhotodiodeImage:
+        """The image of each photodiode, which share the reading of samples, and their sum."""
+        if plan is not None:
+            raise InputError(
+                "a plan is for one image, and this sensor has "
+                f"{'×'.join(map(str, self.sensor.photodiodes))} photodiodes in a pixel: leave it out, or compile and "
+                "capture with camera.photodiode(row, column)"
+            )
+        rows, columns = (range(count) for count in self.sensor.photodiodes)
+        cameras = [self.photodiode(row, column) for row in rows for column in columns]
+        if executor is None and progress is None:
+            images = captured_in_batches(cameras, light_field, how)
+        else:
+            images = [camera.capture(light_field, how, executor=executor, progress=progress) for camera in cameras]
+        return PhotodiodeImage.of([images[row * len(columns) : (row + 1) * len(columns)] for row in rows], self)
 
     def _image(self, found: Recorded) -> Image:
         return Image(

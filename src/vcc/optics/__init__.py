@@ -9,6 +9,7 @@ from vcc.optics.lens import Lens
 from vcc.optics.lens_array import LensArray, PrismArray
 from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
+from vcc.optics.pixels import Microlens
 from vcc.optics.prisms import Biprism, Prism, Pyramid
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.terms import Term
@@ -30,6 +31,7 @@ __all__ = [
     "LensArray",
     "Louvre",
     "Mask",
+    "Microlens",
     "Part",
     "PhasePlate",
     "Prism",

@@ -46,6 +46,10 @@ class AngleFilter(Element):
         with checks.within(self.label):
             object.__setattr__(self, "pattern", as_pattern(self.pattern))
 
+    def described(self) -> str:
+        """The pattern, and how its lengths are slopes."""
+        return f"{super().described()}, 1 m for a slope of 1"
+
     def faces(self) -> Faces:
         """A transmission by slopes."""
         return Faces(terms=(Term.of_slopes(self.pattern),))

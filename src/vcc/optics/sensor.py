@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
@@ -14,6 +15,8 @@ from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.electronics import Electronics
+from vcc.optics.pixels import Microlens
+from vcc.shapes.patterns import Pattern, as_pattern
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,15 @@ class Sensor(Shown):
         fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
             pixel's own proportions in its middle. A smaller one gathers less light, and sharper samples.
         electronics: how pixels turn light into numbers, for `vcc.Camera.expose`; None where only irradiance
-            is asked for.
+            is asked for. Of a sensor with photodiodes, that of one photodiode.
+        photodiodes: (rows, columns) in each pixel, under its microlens: (1, 2) for dual pixels, (2, 2) for quad pixels.
+        microlens: over the photodiodes of each pixel; None: one that images the exit pupil of the camera's stop.
+        angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`, in
+            which a length of 1 m is a slope of 1, or a function of two arrays. None: pixels respond alike to all slopes.
 
     Raises:
-        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, or a fill
-            factor outside its range.
+        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor outside
+            its range, fewer than one photodiode, or a microlens without photodiodes.
     """
 
     z: float = field(metadata={"unit": "length"})
@@ -41,6 +48,9 @@ class Sensor(Shown):
     decentre: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
     fill_factor: float = 1.0
     electronics: Electronics | None = None
+    photodiodes: tuple[int, int] = (1, 1)
+    microlens: Microlens | None = None
+    angular_response: Pattern | Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         checks.finite("the sensor's z", self.z, "metres")
@@ -53,10 +63,22 @@ class Sensor(Shown):
             raise InputError(
                 f"the sensor's electronics are a vcc.Electronics, not a {type(self.electronics).__name__}"
             )
+        self._check_pixels()
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "decentre", middle)
+
+    def _check_pixels(self) -> None:
+        photodiodes = checks.counts("the sensor's photodiodes", self.photodiodes, "rows", "columns")
+        object.__setattr__(self, "photodiodes", photodiodes)
+        if self.microlens is not None and not isinstance(self.microlens, Microlens):
+            raise InputError(f"the sensor's microlens is a vcc.Microlens, not a {type(self.microlens).__name__}")
+        if self.microlens is not None and photodiodes == (1, 1):
+            raise InputError("the sensor has a microlens and one photodiode: give photodiodes, such as (1, 2)")
+        if self.angular_response is not None:
+            with checks.within("the sensor's angular_response"):
+                object.__setattr__(self, "angular_response", as_pattern(self.angular_response))
 
     def _check_pitch(self) -> None:
         pitches = self.pitch if isinstance(self.pitch, tuple | list) else (self.pitch, self.pitch)

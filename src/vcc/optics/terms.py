@@ -89,11 +89,11 @@ class Term(Value):
     def mixes(self) -> bool:
         """Whether the two numbers see place and slope along different axes, as (x, h·s) does.
 
-        A mask at some distance sees M·(a·(x, y) + b·(s, t)) with one 2×2 matrix M: then footprints of samples are
-        parallelograms in its plane. Otherwise they can be lines, and rays are traced.
+        A mask at some distance sees x and s by its first number, y and t by its second, perhaps rotated: footprints of samples
+        are rectangles or parallelograms in its plane. Otherwise they can be lines, and rays are traced.
         """
-        parts = [part for part in (np.asarray(self.of)[:, :2], np.asarray(self.of)[:, 2:4]) if part.any()]
-        # Metres and slopes have different units, so each part is compared by its own size.
-        scaled = [part / np.abs(part).max() for part in parts]
-        alike = all(min(np.abs(one - scaled[0]).max(), np.abs(one + scaled[0]).max()) < 1e-9 for one in scaled)
-        return not alike or abs(float(np.linalg.det(scaled[0]))) < 1e-9
+        parts = [np.asarray(self.of)[:, :2], np.asarray(self.of)[:, 2:4]]
+        if not any(part[[0, 1], [1, 0]].any() for part in parts):
+            return False
+        scaled = [part / np.abs(part).max() for part in parts if part.any()]
+        return any(abs(float(np.linalg.det(part))) < 1e-9 for part in scaled)

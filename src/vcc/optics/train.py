@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cmp_to_key
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,14 @@ from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
+from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
 from vcc.optics.sensor import Sensor
 from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
+
+
+RESPONSE = "response of the pixels"
+"""Name of the sensor's angular response among the stages of a train."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -226,7 +231,7 @@ class Train(Value, Shown):
     def _path(self) -> tuple[tuple[Stage, ...], Affine]:
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
-        for element in self.elements:
+        for element in (*self.elements, *self._pixels):
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in element.parts():
@@ -248,6 +253,68 @@ class Train(Value, Shown):
             here += element.length
         return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
 
+    @property
+    def _pixels(self) -> tuple[Element, ...]:
+        """The response of pixels to slopes, as an element at the sensor."""
+        response = self.sensor.angular_response
+        if response is None:
+            return ()
+        return (PixelTransmission(z=self.sensor.z, name=RESPONSE, terms=(Term.of_slopes(response),)),)
+
+    def photodiode(self, row: int, column: int) -> Self:
+        """The same with one of the sensor's photodiodes in place of the whole pixels.
+
+        Args:
+            row: 0 for the top one (smaller y).
+            column: 0 for the left one (smaller x), which records light from the right half of the exit pupil.
+
+        Raises:
+            InputError: no such photodiode, no stop whose exit pupil the microlenses are shifted for, or a microlens
+                without the height that its photodiodes need.
+        """
+        sensor = self.sensor
+        rows, columns = sensor.photodiodes
+        if not (0 <= row < rows and 0 <= column < columns):
+            raise InputError(
+                f"there is no photodiode ({row}, {column}): the sensor has {rows}×{columns} (rows, columns) in a pixel"
+            )
+        microlens = sensor.microlens or Microlens()
+        distance = microlens.pupil_distance
+        chief = self._chief_rays() if distance is None else SlopesOfChief.from_distance(distance)
+        term = photodiode_term(sensor.photodiodes, (row, column), sensor.pitches, microlens, chief)
+        named = f"photodiode ({row}, {column})"
+        pixels = PixelTransmission(z=sensor.z, name=named, terms=(term,))
+        plain = replace(sensor, photodiodes=(1, 1), microlens=None)
+        return type(self)((*self.elements, pixels), plain, name=self.name)
+
+    def _chief_rays(self) -> SlopesOfChief:
+        """The rays from the middle of the exit pupil: the image of the stop that bounds slopes most.
+
+        Raises:
+            InputError: there is none.
+        """
+        from_sensor = self.arriving_at_sensor.inverse()
+        best: tuple[float, SlopesOfChief] | None = None
+        for stage in reversed(self.stages):
+            if stage.faces.bending is not None:
+                break  # what lies before it is not imaged as a whole
+            if stage.faces.pattern is None or stage.term is not None:
+                continue
+            stop_from_sensor = stage.leaving @ from_sensor
+            by_slope = stop_from_sensor.linear[:2, 2:]
+            half = min(stage.faces.pattern.size) / 2
+            if math.isfinite(half) and abs(np.linalg.det(by_slope)) > 1e-12 * max(np.abs(by_slope).max(), 1e-12) ** 2:
+                bound = half / float(np.linalg.norm(by_slope, 2))
+                if best is None or bound < best[0]:
+                    middle = stage.element.decentre
+                    best = bound, SlopesOfChief.from_stop(stop_from_sensor, middle, stage.element.label)
+        if best is None:
+            raise InputError(
+                "photodiodes need an exit pupil, and no stop of known size lies before the sensor (behind plates and "
+                "arrays): give the lens a diameter, or Sensor(microlens=vcc.Microlens(pupil_distance=…))"
+            )
+        return best[1]
+
     def listed(self) -> list[str]:
         """The elements in order and the sensor, a line each: place, kind, name and parameters."""
         lines = []
@@ -257,7 +324,10 @@ class Train(Value, Shown):
         rows, columns = self.sensor.shape
         vertical, horizontal = self.sensor.pitches
         pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
-        return [*lines, f"{_place(self.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}"]
+        within = "×".join(map(str, self.sensor.photodiodes))
+        parts = "" if within == "1×1" else f", {within} photodiodes each"
+        response = "" if self.sensor.angular_response is None else ", with an angular response"
+        return [*lines, f"{_place(self.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}{parts}{response}"]
 
     def __repr__(self) -> str:
         count = len(self.elements)

@@ -7,7 +7,7 @@ own stream, which depends only on the seed: a recording does not depend on the n
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -118,9 +118,11 @@ class Exposure:
         seed: of the noise, an integer.
         radiance: the radiance of a light field's sample value of 1, W/(m²·sr), in each channel's band.
         threads: how many run at once; None uses all cores available to this process.
+        photodiode: number of the photodiode of each pixel whose noise is drawn.
 
     Raises:
-        InputError: a sensor without electronics, an unusable time, seed or radiance.
+        InputError: a sensor without electronics, an unusable time, seed or radiance, or photodiodes whose sum needs
+            more than 16 bits.
     """
 
     sensor: Sensor
@@ -128,9 +130,10 @@ class Exposure:
     seed: int = 0
     radiance: float = 1.0
     threads: int | None = None
+    photodiode: int = 0
 
     def __post_init__(self) -> None:
-        electronics_of(self.sensor)
+        electronics_of(self.sensor).binned(math.prod(self.sensor.photodiodes))
         if not (isinstance(self.time, str) and self.time == "auto"):
             object.__setattr__(self, "time", checked_exposure(self.time))
         object.__setattr__(self, "seed", checks.seed(self.seed))
@@ -143,6 +146,13 @@ class Exposure:
             InputError: the numbers of channels differ.
         """
         electronics_of(self.sensor).check_channels(channels)
+
+    def timed(self, light: NDArray[np.float32]) -> Exposure:
+        """With the time that ``"auto"`` gives for this irradiance; see `recorded`."""
+        if not isinstance(self.time, str):
+            return self
+        rate = _photo_electrons_per_second(light, self.sensor, self.radiance)
+        return replace(self, time=_auto_exposure(rate, electronics_of(self.sensor)))
 
     def recorded(self, light: NDArray[np.float32], missing_rays: float = 0.0) -> RawPicture:
         """The recording of irradiance on the sensor.
@@ -164,7 +174,7 @@ class Exposure:
         self.check_channels(light.shape[2] if light.ndim == 3 else None)
         rate = _photo_electrons_per_second(light, self.sensor, self.radiance)
         time = _auto_exposure(rate, electronics) if isinstance(self.time, str) else self.time
-        values, saturated = numbers_of(rate, time, electronics, self.seed, self.threads)
+        values, saturated = numbers_of(rate, time, electronics, self.seed, self.threads, self.photodiode)
         return RawPicture(values, self.sensor, time, self.radiance, self.seed, saturated, missing_rays)
 
 
@@ -251,7 +261,12 @@ def _auto_exposure(rate: NDArray[np.float64], electronics: Electronics) -> float
 
 
 def numbers_of(
-    rate: NDArray[np.float64], exposure: float, electronics: Electronics, seed: int, threads: int | None = None
+    rate: NDArray[np.float64],
+    exposure: float,
+    electronics: Electronics,
+    seed: int,
+    threads: int | None = None,
+    photodiode: int = 0,
 ) -> tuple[NDArray[Any], float]:
     """Digital numbers for the mean rates of photo-electrons, and the share of pixels that are saturated.
 
@@ -261,6 +276,7 @@ def numbers_of(
         electronics: converts electrons to numbers.
         seed: of the noise.
         threads: how many run at once; None uses all cores available to this process.
+        photodiode: number of the photodiode of each pixel whose noise is drawn.
     """
     rows = rate.shape[0]
     height = _rows_of_a_block(rate.shape)
@@ -268,9 +284,9 @@ def numbers_of(
 
     def read_block(block: int) -> int:
         lines = slice(block * height, min((block + 1) * height, rows))
-        noise, pattern = _generator(seed, _TEMPORAL, block), None
+        noise, pattern = _generator(seed, _TEMPORAL, block, photodiode), None
         if electronics.prnu or electronics.dsnu:
-            pattern = _generator(electronics.pattern_seed, _PATTERN, block)
+            pattern = _generator(electronics.pattern_seed, _PATTERN, block, photodiode)
         values[lines], saturated = _read_block(rate[lines], exposure, electronics, noise, pattern)
         return saturated
 
@@ -304,8 +320,9 @@ def _rows_of_a_block(shape: tuple[int, ...]) -> int:
     return max(1, _BLOCK // max(1, math.prod(shape[1:])))
 
 
-def _generator(seed: int, stream: int, block: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream, block)))
+def _generator(seed: int, stream: int, block: int, photodiode: int = 0) -> np.random.Generator:
+    key = (stream, block, photodiode) if photodiode else (stream, block)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
 def _read_block(
