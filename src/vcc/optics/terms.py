@@ -73,6 +73,22 @@ class Term(Value):
         """A pattern at which rays arrive ``distance`` metres behind the element: (x + distance·s, y + distance·t)."""
         return cls(pattern, ((1, 0, distance, 0), (0, 1, 0, distance)))
 
+    def share(self, rays: Array) -> Array:
+        """The share of light that passes, of rays (..., 4) about the element's middle."""
+        matrix = np.asarray(self.of)
+        seen = rays @ matrix[:, :4].T + matrix[:, 4]
+        return np.asarray(self.pattern(seen[..., 0], seen[..., 1]), dtype=np.float64)  # type: ignore[operator]
+
+    @property
+    def steepest(self) -> tuple[float, float]:
+        """The largest slopes (s, t) that light through the element's middle can have to pass; infinite if unbounded."""
+        by_slope = np.asarray(self.of)[:, 2:4]
+        half = np.array(self.pattern.size) / 2  # type: ignore[union-attr]
+        bounds = np.full((2, 2), np.inf)
+        np.divide(half[:, None], np.abs(by_slope), out=bounds, where=by_slope != 0)
+        s, t = bounds.min(axis=0).tolist()
+        return s, t
+
     @property
     @cached
     def to_plane(self) -> Affine:
