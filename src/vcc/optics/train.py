@@ -279,20 +279,23 @@ class Train(Value, Shown):
                 f"there is no photodiode ({row}, {column}): the sensor has {rows}×{columns} (rows, columns) in a pixel"
             )
         microlens = sensor.microlens or Microlens()
-        distance = microlens.pupil_distance
-        chief = self._chief_rays() if distance is None else SlopesOfChief.from_distance(distance)
-        term = photodiode_term(sensor.photodiodes, (row, column), sensor.pitches, microlens, chief)
+        term = photodiode_term(sensor.photodiodes, (row, column), sensor.pitches, microlens, self.chief_rays())
         named = f"photodiode ({row}, {column})"
         pixels = PixelTransmission(z=sensor.z, name=named, terms=(term,))
         plain = replace(sensor, photodiodes=(1, 1), microlens=None)
         return type(self)((*self.elements, pixels), plain, name=self.name)
 
-    def _chief_rays(self) -> SlopesOfChief:
-        """The rays from the middle of the exit pupil: the image of the stop that bounds slopes most.
+    def chief_rays(self) -> SlopesOfChief:
+        """The rays from the middle of the exit pupil: that of the sensor's microlens, or of the camera's stop.
+
+        The stop is the opening of known size that lets the smallest range of slopes through to a place on the sensor.
 
         Raises:
-            InputError: there is none.
+            InputError: neither is known.
         """
+        given = None if self.sensor.microlens is None else self.sensor.microlens.pupil_distance
+        if given is not None:
+            return SlopesOfChief.from_distance(given)
         from_sensor = self.arriving_at_sensor.inverse()
         best: tuple[float, SlopesOfChief] | None = None
         for stage in reversed(self.stages):

@@ -67,7 +67,10 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     axes.set_ylim(*((-highest, highest) if axis == 0 else (highest, -highest)))
     pen = Pen(axis, -half, half, 0.03 * (end + before), axes)
     draw_optical_axis(axes)
-    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z))  # parallel: heights are the same there
+    positions = paths.positions.copy()  # light arrives along straight lines, however far before it is drawn from
+    arriving = (positions[:, 1] - positions[:, 0]) / (paths.z[1] - paths.z[0])
+    positions[:, 0] = positions[:, 1] - arriving * before
+    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z), positions=positions)
     draw_paths(axes, math.inf, paths, axis, style.BLUE)
     draw_element(pen, element, half)
     style.tidy(axes, "z from the element [mm]", f"{across} [mm]")
