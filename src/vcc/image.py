@@ -253,6 +253,40 @@ class Image(Shown):
         return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"
 
 
+def interleaved(kinds: Sequence[Sequence[Image]], camera: Train | CameraMark | None) -> Image:
+    """The image whose pixels alternate between images of one frame, in a tile that begins at the top left pixel.
+
+    Args:
+        kinds: rows of columns of the tile.
+        camera: that made it.
+    """
+    listed = [image for row in kinds for image in row]
+    first = listed[0]
+    if isinstance(first, PhotodiodeImage):
+        grid = [[(r, c) for c in range(len(row))] for r, row in enumerate(first.photodiodes)]
+        return PhotodiodeImage.of(
+            [
+                [interleaved([[one.photodiodes[r][c] for one in row] for row in kinds], camera) for r, c in places]  # type: ignore[attr-defined]
+                for places in grid
+            ],
+            camera,
+        )
+    space = array_namespace(first.values)
+    values = first.values * 0
+    for r, row in enumerate(kinds):
+        for c, image in enumerate(row):
+            own = np.zeros((*first.shape[:2], *(1,) * (len(first.shape) - 2)), dtype=np.float32)
+            own[r :: len(kinds), c :: len(row)] = 1
+            values = values + image.values * space.asarray(own)
+    return replace(
+        first,
+        values=values,
+        missing_rays=max(image.missing_rays for image in listed),
+        sampling_error=math.sqrt(sum(image.sampling_error**2 for image in listed) / len(listed)),
+        camera=camera,
+    )
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotodiodeImage(Image):
     """The image of pixels with several photodiodes: the ordinary image, their sum, and the image of each photodiode.

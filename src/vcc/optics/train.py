@@ -255,9 +255,9 @@ class Train(Value, Shown):
 
     @property
     def _pixels(self) -> tuple[Element, ...]:
-        """The response of pixels to slopes, as an element at the sensor."""
+        """The response of pixels to slopes, as an element at the sensor, where all pixels respond alike."""
         response = self.sensor.angular_response
-        if response is None:
+        if response is None or isinstance(response, tuple):
             return ()
         return (PixelTransmission(z=self.sensor.z, name=RESPONSE, terms=(Term.of_slopes(response),)),)
 
@@ -284,6 +284,24 @@ class Train(Value, Shown):
         pixels = PixelTransmission(z=sensor.z, name=named, terms=(term,))
         plain = replace(sensor, photodiodes=(1, 1), microlens=None)
         return type(self)((*self.elements, pixels), plain, name=self.name)
+
+    def pixel_kind(self, row: int, column: int) -> Self:
+        """The same with all pixels like one of the tile that `Sensor.angular_response` repeats over the sensor.
+
+        Args:
+            row: of the tile.
+            column: likewise.
+
+        Raises:
+            InputError: no such pixel of the tile.
+        """
+        kinds = self.sensor.pixel_kinds
+        if not (0 <= row < len(kinds) and 0 <= column < len(kinds[0])):
+            raise InputError(
+                f"there is no pixel ({row}, {column}) in a tile of {len(kinds)}×{len(kinds[0])} angular responses"
+            )
+        sensor = replace(self.sensor, angular_response=kinds[row][column])
+        return type(self)(self.elements, sensor, name=self.name)
 
     def chief_rays(self) -> SlopesOfChief:
         """The rays from the middle of the exit pupil: that of the sensor's microlens, or of the camera's stop.
