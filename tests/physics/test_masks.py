@@ -1,8 +1,8 @@
-"""Masks: against the sensor, at the lens and half-way, any number of them, in any order.
+"""Masks: against the sensor, at the lens and in mid-path, any number of them, in any order.
 
-Oracles: the picture without the mask times the mask's pixel means (closed form, which linear interpolation makes);
-equality of two ways to say the same aperture; the brute-force tracer for what is half-way and for what mask and
-light do together within a pixel.
+Oracles: the image without the mask times the mask's pixel means (closed form, which linear interpolation
+computes); equality of two descriptions of the same aperture; the brute-force tracer for masks in mid-path and
+for joint effects of mask and light within a pixel.
 """
 
 from __future__ import annotations
