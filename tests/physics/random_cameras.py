@@ -48,7 +48,7 @@ AFFINE = (
     "turned mask",
     "blur",
 )
-"""Kinds of cameras computed by footprints."""
+"""Kinds of cameras that are made of footprints."""
 BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask")
 """Kinds that are traced."""
 KINDS = AFFINE + BENT
