@@ -1,13 +1,15 @@
-"""Random cameras of all elements, and closed-form scenes before them: what the laws and brute force are held on.
+"""Random cameras with all elements, and closed-form scenes in front of them, for the laws and for brute force.
 
-Everything follows from a kind and a seed. What is drawn: elements in any order along the axis, decentred and out
-of focus, at the entrance plane, at the lens, mid-way, against the sensor and a little before it; stops within the
-grid of views, or none; views that converge or are parallel, flown or not, closer along one axis than along the
-other; pixels of any proportions, smaller and larger than samples; floating point and bytes, one channel or three.
+Everything follows from a kind and a seed. Random are: elements in any order along the axis, decentred and
+defocused, at the entrance plane, at the lens, in mid-path, against the sensor and a little in front of it; stops
+within the grid of views, or none; views that converge or are parallel, propagated or not, denser along one axis
+than along the other; pixels of any aspect ratio, smaller and larger than samples; floating point and bytes, one
+channel or three.
 
-Views are so dense that neighbouring views' pictures of a scene lie less than `GAP` pixels (or samples, where these
-are larger) apart on the sensor, and periods are so long that samples carry them (`FINEST`): further apart or
-finer, the light field does not say what lies between, and no picture of it could be held against the truth.
+Views are so dense that neighbouring views' images of a scene are less than `GAP` pixels (or samples, if these
+are larger) apart on the sensor, and periods are so long that samples resolve them (`FINEST`). With larger gaps
+or finer periods, the light field would not determine the image, and no comparison with the truth would be
+possible.
 """
 
 from __future__ import annotations
@@ -29,11 +31,11 @@ from vcc.shapes import kernels, patterns, surfaces
 Array = NDArray[np.float64]
 
 GAP = 0.75
-"""Pixels (samples, where larger) between neighbouring views' pictures of what is furthest out of focus."""
+"""Pixels (samples, if larger) between neighbouring views' images of the plane that is furthest out of focus."""
 FINEST = 5.5
 """Shortest period of a scene in samples and in pixels, whichever are larger."""
 MARGIN = 4
-"""Samples around what the camera's rays ask for: as many as any interpolation or filter may reach."""
+"""Samples around those that the camera's rays read: the largest reach of any interpolation or filter."""
 
 AFFINE = (
     "lenses",
@@ -73,16 +75,16 @@ class Case:
 
     Args:
         kind: one of `KINDS`.
-        seed: what was drawn follows from both.
+        seed: kind and seed determine the case.
         camera: any.
         scene: in closed form at z = 0.
         frame: 5×5 at z = 0.
         shape: (v, u, t, s).
-        flown: metres since the plane of the views.
+        flown: propagation distance from the plane of the views, metres.
         sample: ``"mean"`` or ``"point"``.
         bytes: whether samples are 8-bit.
-        channels: None, or how many; each is the scene times a factor.
-        disparities: (lowest, highest) of the scene, pixels a view along u.
+        channels: None, or their number; each is the scene times a factor.
+        disparities: (lowest, highest) of the scene, pixels per view along u.
     """
 
     kind: str
@@ -112,7 +114,7 @@ class Case:
         return vcc.LightField(held, vcc.Affine(self.frame), self.disparities, self.sample)
 
     def described(self) -> str:
-        """What was drawn, in a line."""
+        """The parameters of the case, in a line."""
         sensor = self.camera.sensor
         parts = [
             f"{each.kind} z={each.z * 1e3:.4g}mm"
@@ -140,12 +142,12 @@ def disparity_along(frame: Array, vergence: float, axis: int) -> float:
 
 
 def drawn(kind: str, seed: int, pixels: int = 32, views: int = 17) -> Case:
-    """A random camera of a kind before a random scene.
+    """A random camera of a kind in front of a random scene.
 
     Args:
         kind: one of `KINDS`.
-        seed: of everything.
-        pixels: about so many a side.
+        seed: determines the case.
+        pixels: approximate number per side.
         views: likewise.
     """
     return _Drawing(kind, seed, pixels, views).case()

@@ -176,8 +176,8 @@ class ManyLines(NamedTuple):
     Args:
         lines: (textures, padded with zeros to a multiple of four; lines; pixels or values of a row of samples)
             float32.
-        taps: int64, rows of taps in groups; taps of a group use neighbouring lines, and end before ``ends[n +
-            1]``.
+        taps: int64, rows of taps in groups; taps of a group use neighbouring lines. Group n ends before
+            ``ends[n + 1]``.
         ends: (groups + 1,) int64.
         begin: (rows of taps,) int64, the line of row 0 of the mask, even if this row is not stored.
         rows: number of rows of the mask.
