@@ -9,6 +9,7 @@ through a fine raster. Any function of (x, y) can be used as a pattern through `
 from __future__ import annotations
 
 import abc
+import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -588,11 +589,28 @@ def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Patter
         kinds = (Open, Circle, Polygon, CosineSum, Cells, Bounded)
         raise InputError(f"{given!r} is no pattern: {instead_of_name(given, 'vcc.patterns', kinds)}")
     if callable(given):
+        _check_two_arguments(given)
         return FunctionPattern(given)
     raise InputError(
         "a pattern is a vcc.patterns.Pattern, a function of (x, y) or, for a mask, an array of transmissions, "
         f"not {type(given).__name__}"
     )
+
+
+def _check_two_arguments(function: Callable[..., Any]) -> None:
+    """Raise if a function cannot be called with (x, y), such as one of position and slope."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # written in C, without a signature
+        return
+    try:
+        signature.bind(0.0, 0.0)
+    except TypeError:
+        raise InputError(
+            f"a pattern is a function of two numbers, (x, y), and this one has the arguments {signature}. A transmission "
+            "that depends on direction, too, is a product of vcc.Term objects, each a function of two numbers that are "
+            "affine in (x, y, s, t): vcc.Faces(terms=(vcc.Term.of_slopes(function),))"
+        ) from None
 
 
 @dataclass(frozen=True)
