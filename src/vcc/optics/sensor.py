@@ -26,9 +26,9 @@ class Sensor(Shown):
         pitch: distance between pixel centres, metres: one number or (vertical, horizontal).
         decentre: place (x, y) of the sensor's middle off the axis, metres.
         fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
-            pixel's own proportions in its middle. A smaller one gathers less light, and sharper samples.
-        electronics: how pixels turn light into numbers, for `vcc.Camera.expose`; None where only irradiance
-            is asked for.
+            pixel's proportions in its middle. A smaller area collects less light, and samples more sharply.
+        electronics: conversion of light into numbers, for `vcc.Camera.expose`; None if only irradiance
+            is needed.
 
     Raises:
         InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, or a fill

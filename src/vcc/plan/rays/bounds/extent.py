@@ -101,7 +101,7 @@ def _through_cells(aim: CellWindows, middle: Array, half: Array) -> RayExtent:
 
 
 def footprint(path: Path, aim: Aim, leg: Leg) -> Array | None:
-    """(width, height) in metres over which the rays of one pixel spread on a leg.
+    """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.
 
     None if unknown: if an element on the way, other than lenses and prisms, bends rays.
     """
