@@ -99,9 +99,8 @@ def _facets(element: Biprism | Pyramid, number: int) -> Faces:
 class Prism(Element):
     """A thin prism: adds the same slope to every ray, s' = s + δs, t' = t + δt.
 
-    The paper prints its prism matrices (eq. 4) as shears, in contradiction to its text; this class implements the
-    constant deflection described in the text. A thin wedge of apex angle α and index n deflects by about (n −
-    1)·α.
+    The paper prints its prism matrices (eq. 4) as shears, in contradiction to its text; this class implements
+    the constant deflection of the text. A thin wedge of apex angle α and index n deflects by about (n − 1)·α.
 
     Args:
         deflection: (δs, δt), dimensionless slopes; positive moves light to the right and down.
