@@ -204,7 +204,7 @@ class Grid(Value):
         return float(by_view / by_pixel)
 
     def distance_of(self, disparity: float) -> float:
-        """The distance in metres of a point with this disparity, pixels per view along u: inverse of `disparity_of`."""
+        """The distance in metres of a point with this disparity (pixels per view along u); see `disparity_of`."""
         return float(self.distances(disparity))
 
     def distances(self, disparities: ArrayLike) -> Array:

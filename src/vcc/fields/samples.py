@@ -109,7 +109,7 @@ class OnGrid(Shown, ABC):
         return self.grid.disparity_of(distance)
 
     def distance_of(self, disparity: float) -> float:
-        """The distance in metres of a point with this disparity, pixels per view along u: inverse of `disparity_of`."""
+        """The distance in metres of a point with this disparity (pixels per view along u); see `disparity_of`."""
         return self.grid.distance_of(disparity)
 
 
