@@ -202,7 +202,7 @@ class HeightMap(_Table):
 
     The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
     Args:
         heights: thickness of the glass, metres, (rows, columns), row 0 at the top; 4×4 or more.
@@ -236,7 +236,7 @@ class HeightMap(_Table):
         return self.refractive_index - 1
 
     def described(self) -> str:
-        """The number of points, the size of the sheet and the glass in words."""
+        """The number of points, the size of the sheet and the glass as text."""
         return f"height map ({self._in_words}, refractive index {self.refractive_index:g})"
 
 
@@ -246,7 +246,7 @@ class PathMap(_Table):
 
     The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
     Args:
         paths: optical path lengths, metres, (rows, columns), row 0 at the top; 4×4 or more.

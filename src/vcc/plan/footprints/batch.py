@@ -152,7 +152,7 @@ class Looks(Brief):
 
 
 def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
-    """Linear part of what other elements do to the light in the middle of the first element's open part."""
+    """Linear effect of the other elements on the light in the middle of the first element's open part."""
     each = first.shape[-1]
     place = (np.arange(each) - (each - 1) / 2) / max(math.sqrt((each**2 - 1) / 12), 1e-300)
     total = np.zeros(means[0].shape)

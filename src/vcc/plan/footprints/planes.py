@@ -92,7 +92,7 @@ class Plane(Brief):
         return cls.at((rays @ frame).matrix[:2], [(pattern, decentre)], label)
 
     def middle_of_view(self, samples: tuple[int, int]) -> Array:
-        """Where the middle of view (0, 0) falls, (x, y) in metres; views have (rows, columns) of samples."""
+        """Place (x, y) of the middle of view (0, 0), metres; ``samples`` are (rows, columns) of a view."""
         rows, columns = samples
         return np.asarray(self.offset + self.sample_step @ np.array([(columns - 1) / 2, (rows - 1) / 2]))
 
