@@ -214,8 +214,7 @@ def _sharpening(core: Footprints, sample: Sample) -> tuple[float, Footprints]:
 
 
 def choose_sharp_footprint(step: Array, divided: SampleDivision) -> str:
-    """Choose the footprint that is sharpened: a tent, which is fast, or a spline if pixels resolve the tent's
-    kinks.
+    """Choose the footprint to sharpen: a tent, which is fast, or a spline if pixels resolve a tent's kinks.
 
     Behind hard edges, divided samples fill their own cells, because the mask cuts them off there.
     """

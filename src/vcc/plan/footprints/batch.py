@@ -41,7 +41,7 @@ class Apart(NamedTuple):
 
     Args:
         error: error of the image if cells are divided into so many parts each way, a share of its light.
-        share: of the rays in whose cells several elements vary.
+        share: share of the rays whose cells contain several varying elements.
         even: for each group, whether it transmits the same light at all sampled places.
     """
 

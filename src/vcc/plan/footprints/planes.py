@@ -99,8 +99,7 @@ class Plane(Brief):
     def boxes(
         self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], parts: int = 1
     ) -> list[tuple[Boxes, float]]:
-        """The cells of taps on a plane that each view meets in one point, as rectangles and their shares of a
-        cell.
+        """The cells of taps on a plane that each view meets in a point, as rectangles and their shares of a cell.
 
         Args:
             index: of the views, (rows of taps, columns of taps, 2); see `tap_origin`.
