@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from vcc.image import load_image as load_image
     from vcc.light_field import LightField as LightField
     from vcc.motion import MovingCamera as MovingCamera
+    from vcc.optics import AngleFilter as AngleFilter
     from vcc.optics import Biprism as Biprism
     from vcc.optics import CodedDiffuser as CodedDiffuser
     from vcc.optics import Diffuser as Diffuser
@@ -30,11 +31,14 @@ if TYPE_CHECKING:
     from vcc.optics import FirstOrder as FirstOrder
     from vcc.optics import Lens as Lens
     from vcc.optics import LensArray as LensArray
+    from vcc.optics import Louvre as Louvre
     from vcc.optics import Mask as Mask
+    from vcc.optics import Microlens as Microlens
     from vcc.optics import PhasePlate as PhasePlate
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
     from vcc.optics import Pyramid as Pyramid
+    from vcc.optics import Term as Term
     from vcc.optics.electronics import Electronics as Electronics
     from vcc.optics.sensor import Sensor as Sensor
     from vcc.plan.how import How as How
@@ -49,6 +53,7 @@ __version__ = VERSION
 
 _HOMES = {
     "Affine": "vcc.base.affine",
+    "AngleFilter": "vcc.optics",
     "Biprism": "vcc.optics",
     "Camera": "vcc.camera",
     "CodedDiffuser": "vcc.optics",
@@ -63,7 +68,9 @@ _HOMES = {
     "Lens": "vcc.optics",
     "LensArray": "vcc.optics",
     "LightField": "vcc.light_field",
+    "Louvre": "vcc.optics",
     "Mask": "vcc.optics",
+    "Microlens": "vcc.optics",
     "MovingCamera": "vcc.motion",
     "PhasePlate": "vcc.optics",
     "Prism": "vcc.optics",
@@ -72,6 +79,7 @@ _HOMES = {
     "Recording": "vcc.recording",
     "ResultWarning": "vcc.base.errors",
     "Sensor": "vcc.optics.sensor",
+    "Term": "vcc.optics",
     "expose_image": "vcc.recording",
     "load_camera": "vcc.camera_file",
     "load_image": "vcc.image",

@@ -15,7 +15,7 @@ from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
-from vcc.image import Image
+from vcc.image import Image, PhotodiodeImage, interleaved
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
 from vcc.optics.focusing import focused_train
@@ -242,7 +242,9 @@ class Camera(Train):
                 ``engine``, ``threads``, ``memory_limit``; `vcc.How` says what each of them is.
 
         Returns:
-            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted).
+            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted). Of a
+            sensor with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of
+            each in ``photodiodes[row][column]``.
 
         Warns:
             ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
@@ -264,12 +266,34 @@ class Camera(Train):
         """
         check_is_light_field(light_field)
         chosen = How.of(how, options)
+        kinds, photodiodes = self.sensor.pixel_kinds, self.sensor.photodiodes
+        if len(kinds) * len(kinds[0]) > 1 or photodiodes != (1, 1):
+            if plan is not None:
+                raise InputError(
+                    "a plan is for one image, and this sensor's pixels have several photodiodes or angular responses: "
+                    "leave it out, or use camera.photodiode(row, column) or camera.pixel_kind(row, column)"
+                )
+            return self._of_parts(light_field, chosen, executor, progress)
         cautions = Cautions(self, light_field.grid)
         _warn_of(cautions.before())
         plan = self._planned(light_field, chosen, plan, options, progress)
         found = drive(plan, light_field, chosen, progress, executor)
         _warn_of(cautions.of(plan, light_field, found, chosen))
         return self._image(found)
+
+    def _of_parts(self, light_field: Samples, how: How, executor: Any, progress: Progress | None) -> Image:
+        """The image of pixels that alternate, or that have several photodiodes, made of an image of each."""
+        kinds = self.sensor.pixel_kinds
+        alternate = len(kinds) * len(kinds[0]) > 1
+        rows, columns = (len(kinds), len(kinds[0])) if alternate else self.sensor.photodiodes
+        part = self.pixel_kind if alternate else self.photodiode
+        cameras = [part(row, column) for row in range(rows) for column in range(columns)]
+        if executor is None and progress is None and cameras[0].sensor.photodiodes == (1, 1):
+            images = captured_in_batches(cameras, light_field, how)
+        else:
+            images = [camera.capture(light_field, how, executor=executor, progress=progress) for camera in cameras]
+        tile = [images[row * columns : (row + 1) * columns] for row in range(rows)]
+        return interleaved(tile, self) if alternate else PhotodiodeImage.of(tile, self)
 
     def _image(self, found: Recorded) -> Image:
         return Image(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
 from numbers import Real
 from os import PathLike
 from typing import Any
@@ -250,6 +251,113 @@ class Image(Shown):
         pitch = short(self.pixel_area**0.5)
         missing = f", {self.missing_rays:.1%} of the rays missing" if self.missing_rays > 0 else ""
         return f"Image({'×'.join(map(str, self.shape))}, pixel {pitch}{missing})"
+
+
+def interleaved(kinds: Sequence[Sequence[Image]], camera: Train | CameraMark | None) -> Image:
+    """The image whose pixels alternate between images of one frame, in a tile that begins at the top left pixel.
+
+    Args:
+        kinds: rows of columns of the tile.
+        camera: that made it.
+    """
+    listed = [image for row in kinds for image in row]
+    first = listed[0]
+    if isinstance(first, PhotodiodeImage):
+        grid = [[(r, c) for c in range(len(row))] for r, row in enumerate(first.photodiodes)]
+        return PhotodiodeImage.of(
+            [
+                [interleaved([[one.photodiodes[r][c] for one in row] for row in kinds], camera) for r, c in places]  # type: ignore[attr-defined]
+                for places in grid
+            ],
+            camera,
+        )
+    space = array_namespace(first.values)
+    values = first.values * 0
+    for r, row in enumerate(kinds):
+        for c, image in enumerate(row):
+            own = np.zeros((*first.shape[:2], *(1,) * (len(first.shape) - 2)), dtype=np.float32)
+            own[r :: len(kinds), c :: len(row)] = 1
+            values = values + image.values * space.asarray(own)
+    return replace(
+        first,
+        values=values,
+        missing_rays=max(image.missing_rays for image in listed),
+        sampling_error=math.sqrt(sum(image.sampling_error**2 for image in listed) / len(listed)),
+        camera=camera,
+    )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotodiodeImage(Image):
+    """The image of pixels with several photodiodes: the ordinary image, their sum, and the image of each photodiode.
+
+    ``image.photodiodes[row][column]`` is an `Image` as the sensor of `vcc.Sensor.photodiodes` defines it: column 0 lies on the
+    left of the pixel, at smaller x, and records light from the right half of the exit pupil. `upright` turns images and
+    order, so that column 0 stays the one on the left. Slices, factors and divisors apply to each photodiode.
+
+    Args:
+        photodiodes: images of one frame, rows of columns.
+    """
+
+    photodiodes: tuple[tuple[Image, ...], ...] = ()
+
+    @classmethod
+    def of(cls, photodiodes: Sequence[Sequence[Image]], camera: Train | CameraMark | None) -> PhotodiodeImage:
+        """From the images of photodiodes, rows of columns."""
+        listed = [image for row in photodiodes for image in row]
+        values = listed[0].values
+        for image in listed[1:]:
+            values = values + image.values
+        return cls(
+            values,
+            listed[0].frame,
+            missing_rays=max(image.missing_rays for image in listed),
+            sampling_error=math.hypot(*(image.sampling_error for image in listed)),
+            inverted=listed[0].inverted,
+            camera=camera,
+            photodiodes=tuple(map(tuple, photodiodes)),
+        )
+
+    def sum(self) -> Image:
+        """The ordinary image: all photodiodes together."""
+        own = {each.name: getattr(self, each.name) for each in fields(Image)}
+        return Image(**own)
+
+    def _mapped(self, function: Callable[[Image], Image], *, turned: bool = False) -> PhotodiodeImage:
+        found = [[function(image) for image in row] for row in self.photodiodes]
+        return PhotodiodeImage.of([row[::-1] for row in found[::-1]] if turned else found, self.camera)
+
+    def __getitem__(self, index: Index | tuple[Index, ...]) -> PhotodiodeImage:
+        """A piece of the images, in its place: slices along (rows, columns[, channel])."""
+        return self._mapped(lambda image: image[index])
+
+    def upright(self) -> PhotodiodeImage:
+        """The images as a person wants to see them, and the photodiodes in the order in which they then lie."""
+        return self._mapped(Image.upright, turned=True) if self.inverted else self
+
+    def _combined(self, other: Any, operation: Callable[[Any, Any], Any], what: str) -> Image:
+        return self.sum()._combined(other.sum() if isinstance(other, PhotodiodeImage) else other, operation, what)
+
+    def _scaled(self, factor: Any, operation: Callable[[Any, Any], Any]) -> Image:
+        return self._mapped(lambda image: image._scaled(factor, operation))
+
+    def to_xarray(self) -> Any:
+        """The images of the photodiodes as one `xarray.DataArray`, as in `Image.to_xarray`.
+
+        Returns:
+            Dimensions (photodiode_y, photodiode_x, y, x[, channel]).
+        """
+        rows = [[image.to_xarray() for image in row] for row in self.photodiodes]
+        import xarray
+
+        # Coordinates and attributes of each are the same but for what is missing and sampled.
+        joined = [xarray.concat(row, "photodiode_x", combine_attrs="override") for row in rows]
+        found = xarray.concat(joined, "photodiode_y", combine_attrs="override")
+        return found.assign_attrs(missing_rays=self.missing_rays, sampling_error=self.sampling_error)
+
+    def __repr__(self) -> str:
+        grid = f"{len(self.photodiodes)}×{len(self.photodiodes[0])}"
+        return f"Photodiode{super().__repr__()[:-1]}, photodiodes {grid})"
 
 
 def load_image(path: str | PathLike[str]) -> Image:

@@ -9,6 +9,7 @@ raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
 from typing import Any
 
 from vcc.base.hints import no_such_name
+from vcc.shapes.directional import AngularFringes
 from vcc.shapes.patterns import (
     Bounded,
     Cells,
@@ -25,6 +26,7 @@ from vcc.shapes.patterns import (
 )
 
 __all__ = [
+    "AngularFringes",
     "Bounded",
     "Cells",
     "Circle",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from typing import Any, Literal
 
@@ -17,7 +17,7 @@ from vcc.files.destination import Target
 from vcc.files.image_metadata import CameraMark, ImageMetadata, RawNumbers
 from vcc.files.images_with_metadata import read_with_metadata, unknown
 from vcc.files.pictures import SavedPicture, save_numbers
-from vcc.image import Image
+from vcc.image import Image, PhotodiodeImage
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.run.demosaic import Demosaicing, demosaic
@@ -158,6 +158,25 @@ class Recording(RawPicture, Shown):
         )
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotodiodeRecording(Recording):
+    """The recording of pixels with several photodiodes: the sum of their numbers, and the recording of each.
+
+    ``recording.photodiodes[row][column]`` is a `Recording` with noise of its own, in the order of
+    `vcc.image.PhotodiodeImage`. The sum is a recording, too: of electronics whose full well, black level, dark current and
+    noise are those of all photodiodes together (`vcc.Electronics.binned`).
+
+    Args:
+        photodiodes: one exposure, rows of columns.
+    """
+
+    photodiodes: tuple[tuple[Recording, ...], ...] = ()
+
+    def image(self) -> PhotodiodeImage:
+        """The irradiance from the numbers of each photodiode; see `Recording.image`."""
+        return PhotodiodeImage.of([[each.image() for each in row] for row in self.photodiodes], self.camera)
+
+
 def expose_image(
     image: Image,
     sensor: Sensor,
@@ -199,6 +218,8 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
         image: irradiance, not upright.
         exposure: how the sensor records.
     """
+    if isinstance(image, PhotodiodeImage):
+        return _recorded_by_photodiodes(image, exposure)
     if not image.inverted:
         raise InputError("a sensor records the picture as it lies on it: give the one that is not upright")
     light = image.to_numpy()
@@ -207,6 +228,33 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
     if caution is not None:
         warn_of_result(caution)
     return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)}, camera=image.camera)
+
+
+def _recorded_by_photodiodes(image: PhotodiodeImage, exposure: Exposure) -> PhotodiodeRecording:
+    """One exposure of all photodiodes: "auto" goes by the brightest photodiode of each pixel."""
+    sensor = exposure.sensor
+    lights = [[each.to_numpy() for each in row] for row in image.photodiodes]
+    timed = exposure.timed(np.maximum.reduce([light for row in lights for light in row]))
+    plain = replace(timed, sensor=replace(sensor, photodiodes=(1, 1), microlens=None))
+    columns = len(image.photodiodes[0])
+    parts = [
+        [recorded(each, replace(plain, photodiode=row * columns + column)) for column, each in enumerate(images)]
+        for row, images in enumerate(image.photodiodes)
+    ]
+    listed = [each for row in parts for each in row]
+    electronics = listed[0].electronics.binned(len(listed))
+    total = np.sum([each.values for each in listed], axis=0, dtype=np.uint32)
+    return PhotodiodeRecording(
+        total.astype(np.uint8 if electronics.bit_depth <= 8 else np.uint16),
+        replace(plain.sensor, electronics=electronics),
+        listed[0].exposure,
+        exposure.radiance,
+        exposure.seed,
+        max(each.saturated for each in listed),
+        image.missing_rays,
+        image.camera,
+        photodiodes=tuple(map(tuple, parts)),
+    )
 
 
 def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:

@@ -1,6 +1,6 @@
-"""The engine of GPUs in numba-cuda's simulator, which runs its kernels as Python, thread by thread.
+"""The GPU engine in numba-cuda's simulator, which runs its kernels as Python, thread by thread.
 
-Run by ``test_cuda.py`` in a process of its own: whether Numba simulates is decided when it is first imported.
+``test_cuda.py`` runs this in a separate process: Numba decides whether to simulate when it is first imported.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vcc.store import open_store, save_store
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
-    # Hashes are meant to overflow, and NumPy's numbers, which the simulator computes with, say so.
+    # Hashes overflow on purpose; NumPy, on which the simulator runs, warns about it.
     pytest.mark.filterwarnings("ignore:.*overflow encountered in scalar multiply"),
 ]
 
@@ -41,7 +41,7 @@ SMALL = vcc.Sensor(49 * mm, (4, 5), 49 * mm * 2e-3)
 
 
 def drawn(seed: int) -> vcc.Camera:
-    """A lens, a prism and up to two masks wherever they fall, before a sensor out of focus."""
+    """A lens, a prism and up to two masks at any positions, in front of a defocused sensor."""
     rng = np.random.default_rng(seed)
     lens = vcc.Lens(50 * mm, diameter=rng.uniform(4, 9) * mm, decentre=tuple(rng.uniform(-0.5, 0.5, 2) * mm))
     masks = [
@@ -143,7 +143,7 @@ def test_tables_stay_while_a_plan_is_used():
 
 
 def with_taps_twice(core: Footprints) -> Footprints:
-    """The last row and the first column of view taps twice, in places of their own: as where cells are divided."""
+    """The last row and first column of view taps doubled, at places of their own, as if cells were divided."""
     taps = np.ix_([0, 1, 1], [0, 0, 1])
     return replace(
         core,
@@ -157,7 +157,7 @@ def with_taps_twice(core: Footprints) -> Footprints:
 
 
 def few_taps_of(core: Footprints) -> Footprints:
-    """Two rows and two columns of view taps: the simulator runs a thread after the other."""
+    """Two rows and two columns of view taps: the simulator runs its threads one after the other."""
     some = np.arange(len(core.view_rows))[4:6], np.arange(len(core.view_columns))[4:6]
     taps = np.ix_(*some)
     return replace(
@@ -216,7 +216,7 @@ def test_backwards_as_the_reference(name, monkeypatch):
 
 
 def assert_close(found: np.ndarray, expected: np.ndarray) -> None:
-    """To 1e-5 of the largest."""
+    """Assert equality to 1e-5 of the largest value."""
     assert found.shape == expected.shape
     assert np.abs(found - expected).max() < 1e-5 * np.abs(expected).max()
 
@@ -233,7 +233,7 @@ def test_an_operator_and_its_adjoint():
 
 
 class Elsewhere:
-    """An array on the GPU, of another library: what it shows is the CUDA array interface."""
+    """An array of another library on the GPU: it only has the CUDA array interface."""
 
     requires_grad = False
     device = SimpleNamespace(id=0)
@@ -257,12 +257,12 @@ class Elsewhere:
 
 
 THEIRS = 77
-"""The stream that another library works in."""
+"""The stream of another library."""
 
 
 @pytest.fixture
 def _another_library(monkeypatch):
-    """The arrays are CuPy's, by name, and the simulator takes them as they lie (it takes none itself)."""
+    """Declare the arrays CuPy's, by name; the simulator, which supports no such arrays, reads them in place."""
     streams = SimpleNamespace(get_current_stream=lambda: SimpleNamespace(ptr=THEIRS))
     of_cupy = SimpleNamespace(asarray=lambda there: Elsewhere(there._ary), ndarray=Elsewhere, cuda=streams)
     monkeypatch.setattr(cuda, "external_stream", lambda number: number)
@@ -280,7 +280,7 @@ def test_arrays_that_are_on_the_gpu_are_taken_and_given_as_they_are():
         picture = camera.capture(there, **options).values
         assert isinstance(picture, Elsewhere)
         np.testing.assert_array_equal(picture.array, camera.capture(lf, **options).values)
-    lf.values[:] *= 2  # what was taken is no copy, which would show the light as it was
+    lf.values[:] *= 2  # samples on the GPU are not a copy, which would keep the old values
     np.testing.assert_allclose(camera.capture(there, **options).values.array, 2 * picture.array, rtol=1e-6)
     core, values = CORES["two masks"]
     found = engine.back(core, Elsewhere(values), np.ones((*core.raster_shape, 3)), threads=1)
@@ -289,7 +289,7 @@ def test_arrays_that_are_on_the_gpu_are_taken_and_given_as_they_are():
 
 @pytest.mark.usefixtures("_another_library")
 def test_kernels_wait_for_the_stream_of_their_library_which_waits_for_them(monkeypatch):
-    """What PyTorch and CuPy start in a stream of their own is not ordered with the default stream by itself."""
+    """Work that PyTorch and CuPy launch in their own stream is not ordered with the default stream."""
     said = []
 
     class Event:
@@ -337,7 +337,7 @@ def test_places_of_pinned_memory_are_kept_from_run_to_run(monkeypatch):
 
     with pytest.raises(KeyboardInterrupt):
         engine.run(core, values, threads=1, progress=interrupt)
-    assert not cuda_footprints._kept  # threads of a run that was broken off may still fill its places
+    assert not cuda_footprints._kept  # threads of an interrupted run may still write to these buffers
 
 
 def test_tables_are_those_of_the_gpu_in_use(monkeypatch):
@@ -423,14 +423,14 @@ def test_rays_that_take_the_nearest_view_and_more_rays_until_they_agree():
 def test_rays_of_samples_that_stay_on_the_gpu(dtype):
     camera, lf = small(elements_before("cells, square")), field_of_rays(samples((2, 2, 4, 5, 3), dtype))
     kept = camera.capture(lf.on_gpu(), samples=4).values
-    # Sharpened there: bytes exactly, floats to their last digits.
+    # Sharpened on the GPU: bytes exactly, floats to their last digits.
     np.testing.assert_allclose(kept, camera.capture(lf, samples=4, engine="cuda").values, rtol=1e-5)
 
 
 def test_the_benchmark_runs(monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["gpu.py", "--tiny"])
     gpu.main()
-    assert capsys.readouterr().out.count("| yes |") == 3  # pictures that agree; of times nothing is said
+    assert capsys.readouterr().out.count("| yes |") == 3  # images that agree; times are not checked
 
 
 def test_what_is_not_done_is_refused_by_name():

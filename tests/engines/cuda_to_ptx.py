@@ -1,8 +1,8 @@
-"""The kernels of the engine of GPUs, compiled for an H100 where there is none.
+"""The kernels of the GPU engine, compiled for an H100 without one.
 
-Run by ``test_cuda.py`` in a process of its own. Every kernel that the engine would start is compiled to PTX for
-the types that it would be given; arrays on the GPU are arrays of NumPy here, which no kernel touches.
-It ends with 77 where NVIDIA's compiler is not installed (extra ``gpu``).
+``test_cuda.py`` runs this in a separate process. Every kernel that the engine would launch is compiled to PTX
+for the types of its arguments. Arrays on the GPU are replaced by NumPy arrays, which no kernel accesses. The
+exit code is 77 if NVIDIA's compiler is not installed (extra ``gpu``).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ H100 = (9, 0)
 
 
 class Machine:
-    """What functions that kernels call are compiled for."""
+    """Compute capability for which the device functions are compiled."""
 
     compute_capability = H100
 
@@ -37,14 +37,14 @@ def has_compiler() -> bool:
 
     try:
         cuda.compile_ptx(nothing.py_func, (typeof(np.zeros(1)),), cc=H100)
-    except Exception as error:  # of many kinds, by what is missing
+    except Exception as error:  # its type depends on the missing part
         print(error)
         return False
     return True
 
 
 def compiled(kernel: Any, threads: Any, stream: Any, *arguments: Any) -> None:
-    """Instead of starting a kernel."""
+    """Replaces the launch of a kernel."""
     types = tuple(map(typeof, arguments))
     if (kernel, types) not in made:
         made[kernel, types], _ = cuda.compile_ptx(kernel.py_func, types, cc=H100)
@@ -104,7 +104,7 @@ def main() -> None:
     for (kernel, _), text in made.items():
         room = re.findall(r"__local_depot\d+\[(\d+)\]", text)
         print(kernel.py_func.__module__.rsplit(".", 1)[1], kernel.py_func.__qualname__, "local memory", room)
-        # Rays keep themselves in local memory, and the cells that a pixel sees.
+        # Rays, and the cells that a pixel sees, are in local memory.
         assert not room or "ray" in kernel.py_func.__module__
 
 

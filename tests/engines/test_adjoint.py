@@ -1,7 +1,7 @@
-"""The picture is linear in the samples, and gradients are its adjoint.
+"""The image is linear in the samples, and gradients are its adjoint.
 
 Oracles: the dot test ⟨w, A x⟩ = ⟨Aᵀ w, x⟩ with random vectors, and linearity itself. float64 samples make
-the array engine work in float64, but pictures are float32: 1e-6.
+the array engine work in float64, but images are float32: 1e-6.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def test_torch_gradients_are_the_adjoint(name, interpolation, frame):
     picture = camera.capture(frame(field(samples)), interpolation=interpolation).values
     w = torch.tensor(random(*picture.shape, seed=1), dtype=torch.float32)
     (gradient,) = torch.autograd.grad((w * picture).sum(), samples)
-    # ⟨Aᵀw, x⟩ = ⟨w, A x⟩ for an x that the gradient was not taken at, pictured by the reference engine
+    # ⟨Aᵀw, x⟩ = ⟨w, A x⟩ for an x other than the point of the gradient, with the image by the reference engine
     x = random(*SHAPE, seed=2)
     pictured = camera.capture(frame(field(x)), interpolation=interpolation, engine="reference").values
     left = float((gradient.numpy() * x).sum())
@@ -74,7 +74,7 @@ def test_jax_gradients_are_the_same_as_torchs(name):
     def objective(samples):
         return (jnp.asarray(w) * camera.capture(field(samples)).values).sum()
 
-    # Compiled as a whole, which takes less time than one operation after the other.
+    # Compiled as a whole, which is faster than one operation at a time.
     by_jax = np.asarray(jax.jit(jax.grad(objective))(jnp.asarray(values)))
     samples = torch.tensor(values, requires_grad=True)
     (torch.asarray(w) * camera.capture(field(samples)).values).sum().backward()

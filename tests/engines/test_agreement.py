@@ -1,7 +1,7 @@
-"""Every engine makes the picture that ``reference`` makes, to 1e-5 of its brightest pixel.
+"""Every engine makes the same image as ``reference``, to 1e-5 of its brightest pixel.
 
-The oracle for what a picture *should* be is elsewhere (tests/physics); here engines are held together, on
-every library that the array engine is required to work with. They are imported, not skipped.
+Whether the image itself is correct is tested in tests/physics. These tests compare engines, for every library
+that the array engine must support. The libraries are imported, not skipped.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from vcc.base.units import mm
 from vcc.plan.operators import SwapPixelAxes
 from vcc.shapes.patterns import CosineSum
 
-# Cameras here ask for what they like.
+# Tests may request any camera: there are no warnings about sampling.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 SHAPE = (3, 4, 9, 11)
 D = 1 / (1 / 50e-3 - 1)
 LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
-# 0.93: no sample, nor a part of one, lies on the border of a pixel, where rounding decides for "nearest"
+# 0.93: no sample or part of a sample lies on a pixel's border, where rounding decides for "nearest"
 SENSOR = vcc.Sensor(D, (11, 13), D * 2e-3 * 0.93)
 
 LIBRARIES = {
@@ -102,7 +102,7 @@ def assert_engines_agree(camera: vcc.Camera, lf: vcc.LightField, libraries=tuple
 @pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
 @pytest.mark.parametrize("name", list(CAMERAS))
 def test_cameras(name, interpolation):
-    # Footprints differ by interpolation in numbers alone: what a library must be able to do is the same for all.
+    # Footprints of different interpolations differ in numbers only: they need the same functions of a library.
     libraries = tuple(LIBRARIES) if interpolation == "linear" else ("numpy", "torch")
     assert_engines_agree(CAMERAS[name], field(samples()), libraries, interpolation=interpolation)
 
@@ -111,9 +111,9 @@ def test_cameras(name, interpolation):
 @pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32", "float64"])
 def test_types_and_channels(dtype, channels):
     shape = SHAPE if channels is None else (*SHAPE, channels)
-    # array-api-strict and JAX have no half precision to spare: the standard does not ask for it
+    # array-api-strict and JAX are left out: the standard does not require half precision
     libraries = ("numpy", "torch") if dtype == "float16" else tuple(n for n in LIBRARIES if n != "jax")
-    # PyTorch's uint16 is a type for storage
+    # PyTorch's uint16 only stores values
     libraries = tuple(name for name in libraries if (dtype, name) != ("uint16", "torch"))
     if dtype in ("uint8", "float32") and channels == 3:
         libraries = (*libraries, "jax")
@@ -155,7 +155,7 @@ def test_values_in_fortran_order_and_channels_first_in_memory():
 
 
 def turned(lf: vcc.LightField, angle: float) -> vcc.LightField:
-    """The light field seen by a camera rolled around the axis."""
+    """The light field as a camera rolled around the axis sees it."""
     c, s = np.cos(angle), np.sin(angle)
     roll = np.array([[c, -s], [s, c]])
     linear = np.zeros((4, 4))
@@ -194,12 +194,12 @@ def test_frames_rolled_by_a_right_angle_swap_the_pixel_axes(name):
 
 
 def test_a_right_angle_turns_the_picture():
-    """An oracle of its own: turning the rays by 90° turns the picture of a round camera by 90°."""
+    """A separate oracle: rotating the rays by 90° rotates the image of a round camera by 90°."""
     sensor = vcc.Sensor(D, (17, 17), D * 2e-3 * 0.9)
     lf = field(samples())
     camera = vcc.Camera([LENS], sensor)
     plain = camera.capture(lf).values
-    # (x, y) → (−y, x): what was at column c, row r comes to column −r, row c.
+    # (x, y) → (−y, x): column c, row r becomes column −r, row c.
     rolled = camera.capture(turned(lf, np.pi / 2)).values
     np.testing.assert_allclose(rolled, np.rot90(plain, -1), rtol=1e-5, atol=1e-6 * plain.max())
 
@@ -220,7 +220,7 @@ def test_refined_samples_of_a_rolled_frame(interpolation):
 
 
 def test_divided_views():
-    # A checkerboard finer than a view's cell under strong defocus: the plan divides cells by itself.
+    # A checkerboard finer than a view's cell under strong defocus: the plan subdivides cells.
     board = np.indices((24, 24)).sum(axis=0) % 2
     stop = vcc.Mask(pattern=board, width=9 * mm)
     camera = vcc.Camera([vcc.Lens(focal_length=50 * mm), stop], vcc.Sensor(44 * mm, (14, 15), 90e-6))

@@ -1,4 +1,4 @@
-"""Sums of a few rows each are the product with the whole matrix, for arrays of every library."""
+"""Products with banded matrices equal those with dense matrices, for arrays of every library."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_they_are_a_matrix(library, kind):
     rows = np.random.default_rng(2).standard_normal((9, 5)).astype(kind)
     found = bands.of(LIBRARIES[library](rows))
     assert type(found) is type(LIBRARIES[library](rows))
-    if library != "jax":  # which has no double precision unless told
+    if library != "jax":  # no double precision by default
         assert np.asarray(found).dtype == kind
     exact = np.asarray(found).dtype == np.float64
     # Nine products of numbers up to 3 in single precision: 9 · 9 · 6e-8.

@@ -1,4 +1,4 @@
-"""Kernels work where their machine code cannot be kept, and where what is kept is damaged."""
+"""Kernels work if their machine code cannot be cached, or if the cached code is damaged."""
 
 import importlib.util
 import sys
@@ -28,7 +28,7 @@ Load = Callable[[], Any]
 
 @pytest.fixture
 def loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Load:
-    """Loads a kernel anew, as each process does, from a file of its own; no code is kept in a home."""
+    """Loads a kernel from its own file, as a new process does, without caching code in the home folder."""
     monkeypatch.setenv("HOME", "/dev/null")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
@@ -48,7 +48,7 @@ def loaded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Load:
 
 
 def was_read(kernel: Any) -> bool:
-    """Whether code of the kernel was read instead of compiled."""
+    """Whether cached code of the kernel was loaded instead of compiling it."""
     return sum(kernel.stats.cache_hits.values()) > 0
 
 
@@ -64,7 +64,7 @@ def test_code_is_kept_beside_its_source_and_read_again(loaded: Load, tmp_path: P
 def test_code_is_compiled_again_where_another_file_of_its_package_has_changed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    """Before, only a kernel's own file counted: old code went on being used, its callees' included."""
+    """A change in a file that a kernel imports invalidates its cached code, not only a change in its own file."""
     header = "from vcc.engines.compiled import compiled\n"
     files = {
         "kernel": f"{header}from of_a_test.called import times\n\n"
@@ -88,9 +88,9 @@ def test_code_is_compiled_again_where_another_file_of_its_package_has_changed(
         importlib.invalidate_caches()
         return importlib.import_module("of_a_test.kernel").made
 
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache has seconds for stamps
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache has timestamps in seconds
     assert load()(2) == 6
-    (folder / "beside.py").write_text("BY = 6\n")  # which nobody imports
+    (folder / "beside.py").write_text("BY = 6\n")  # not imported
     again = load()
     assert again(2) == 6
     assert was_read(again)
@@ -101,7 +101,7 @@ def test_code_is_compiled_again_where_another_file_of_its_package_has_changed(
 
 
 def test_stamps_cost_little() -> None:
-    """All of the package's kernels are stamped when they are imported: a few milliseconds."""
+    """Stamping all kernels of the package at import takes a few milliseconds."""
     from vcc.engines import ray_loops
 
     compiled._read.cache_clear()
@@ -124,7 +124,7 @@ def test_a_cache_that_came_along_and_cannot_be_written_to_is_read(
         raise PermissionError(13, "Permission denied")
 
     loaded()(21)
-    monkeypatch.setattr(tempfile, "TemporaryFile", refused)  # with which Numba tries whether it may write
+    monkeypatch.setattr(tempfile, "TemporaryFile", refused)  # Numba tests with it whether a folder is writable
     kernel = loaded()
     assert kernel(21) == 42
     assert was_read(kernel)
@@ -150,7 +150,7 @@ def test_code_that_another_process_kept_under_the_same_name_is_not_taken(loaded:
     for file in (tmp_path / "__pycache__").glob("kernel.doubled*"):
         file.unlink()
     loaded()(21)
-    kept.write_bytes(other)  # as where two processes keep code of a function at the same moment
+    kept.write_bytes(other)  # as if two processes cached code of a function at the same time
     kernel = loaded()
     assert kernel(21) == 42
     assert not was_read(kernel)
@@ -167,13 +167,13 @@ def test_a_disk_that_fills_up_while_code_is_kept_is_no_failure(
     with pytest.warns(CacheWarning, match="No space left"):
         assert kernel(21) == 42
     monkeypatch.undo()
-    with warnings.catch_warnings():  # what the index says is there, and is not, is compiled
+    with warnings.catch_warnings():  # code that the index lists, but that does not exist, is compiled
         warnings.simplefilter("error")
         assert loaded()(21) == 42
 
 
 def test_processes_take_turns_to_keep_code(loaded: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another has the turn, and lets go of it when it has been waited for."""
+    """Another process holds the lock, and releases it while this one waits."""
     fcntl = pytest.importorskip("fcntl")
     folder, waited = tmp_path / "__pycache__", []
     folder.mkdir()

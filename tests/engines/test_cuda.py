@@ -1,4 +1,4 @@
-"""The engine of GPUs: its kernels in the simulator, where there is no GPU, and what is said without one."""
+"""The GPU engine: its kernels in the simulator, without a GPU, and the errors on a machine without one."""
 
 from __future__ import annotations
 

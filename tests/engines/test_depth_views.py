@@ -1,6 +1,6 @@
-"""Views in between, made from neighbouring ones and their disparities.
+"""Views in between, rendered from neighbouring views and their disparities.
 
-The oracles are closed-form planes, seen from in between; linearity; and symmetry: a transposed or mirrored light
+Oracles: closed-form planes, seen from in between; linearity; and symmetry: a transposed or mirrored light
 field has transposed or mirrored views in between.
 """
 
@@ -28,13 +28,13 @@ FAR_OUT_OF_FOCUS = vcc.Camera([LENS], vcc.Sensor(z=50 * mm, shape=(20, 24), pitc
 
 
 def wave(column, row, view_column, view_row, disparity):
-    """A plane's texture, of periods from 7 pixels, as seen at pixels of a view."""
+    """A plane's texture, with periods of 7 pixels and more, as seen at pixels of a view."""
     x, y = column + disparity * view_column, row + disparity * view_row
     return 0.5 + 0.2 * np.cos(0.6 * x + 0.4 * y) + 0.2 * np.sin(0.2 * x - 0.9 * y)
 
 
 def plane(disparity, times=1, views=(3, 3), pixels=(40, 48)):
-    """Samples of (views·times)² views of one plane, over the same aperture as the first ``views``."""
+    """Samples of (views·times)² views of one plane, over the aperture of the first ``views``."""
     v, u = ((np.arange(n * times) + 0.5) / times - 0.5 - (n - 1) / 2 for n in views)
     grid = np.ix_(v, u, np.arange(pixels[0]), np.arange(pixels[1]))
     return wave(grid[3], grid[2], grid[1], grid[0], disparity).astype(np.float32)
@@ -60,16 +60,16 @@ def made(values, rule):
 def test_a_plane_is_seen_from_between_as_its_formula_says(disparity):
     values = plane(disparity)
     pictures, views = made(values, between((3, 3), np.full(values.shape, disparity)))
-    # What Keys' cubic misses of a wave of ω radians a pixel is ω³/(24·√3)·¾ at most (its cubic term); of these,
-    # amplitude 0.2 and 0.92: 0.2 · 0.015 = 0.003. Pixels near the ends of pictures look outside.
+    # The error of Keys' cubic for a wave of ω radians per pixel is at most ω³/(24·√3)·¾ (its cubic term): for
+    # amplitudes 0.2 and 0.92 it is 0.2 · 0.015 = 0.003. Pixels near the ends of views read outside.
     error = np.abs(pictures - plane(disparity, 3))[:, :, 4:-4, 4:-4]
     assert error.max() < (0.006 if disparity % 3 else 1e-5)
-    # Beyond the outermost views, at most a third of a view away, an end of the pictures is seen by none.
+    # Beyond the outermost views, at most a third of a view away, no view shows one end of the images.
     assert views.unseen <= views.made * abs(disparity) / 3 * (1 / 40 + 1 / 48)
 
 
 def two_planes(times=1):
-    """A nearer square at disparity 2 before a plane at −1, its border between pixels; and disparities."""
+    """A nearer square at disparity 2 in front of a plane at −1, its border between pixels; and disparities."""
     near, far = plane(2.0, times), plane(-1.0, times)
     v = (np.arange(3 * times) + 0.5) / times - 1.5
     grid = np.ix_(v, v, np.arange(40), np.arange(48))
@@ -83,14 +83,14 @@ def test_near_things_hide_what_is_behind_and_show_it_beside():
     pictures, views = made(values, between((4, 4), disparity))
     expected, _, inside = two_planes(4)
     error = np.abs(pictures - expected)
-    # Borders of point samples are known to a pixel, and cubic interpolation reaches two.
+    # Borders of point samples are known to one pixel, and cubic interpolation reaches two pixels.
     sides = sum(np.roll(inside, (a, b), (2, 3)).astype(int) for a in range(-2, 3) for b in range(-2, 3))
     clear = np.zeros_like(inside)
     clear[:, :, 4:-4, 4:-4] = True
     clear &= (sides == 0) | (sides == 25)
     wrong = error[clear] > 0.02
-    # Strips that the nearest view does not show are shown by others, but for those at the ends of the grid of
-    # views, which have none beyond: these are counted, and borders go on there.
+    # Other views show the strips that the nearest view does not, except at the ends of the grid of views. These
+    # strips are counted, and borders are extended there.
     assert 0 < views.unseen < 0.01 * views.made
     assert wrong.sum() <= views.unseen
     # Keys' cubic, as above.
@@ -109,7 +109,7 @@ def test_it_commutes_with_transposing_and_mirroring(turn):
         axes = {"upside down": (0, 2), "left to right": (1, 3), "turned over": (0, 1, 2, 3)}[turn]
         change = lambda a: np.ascontiguousarray(np.flip(a, axes))  # noqa: E731
     turned, _ = made(change(values), between(times, change(disparity), frame))
-    # Both sides of a tear are as far from its middle only to rounding: a few pixels may fall to the other side.
+    # Both sides of a tear are equally far from its middle except for rounding: a few pixels may change sides.
     apart = np.abs(turned - change(pictures))
     assert (apart > 1e-5).mean() < 1e-3
 
@@ -147,7 +147,7 @@ def field(channels=3, **given) -> vcc.LightField:
     return vcc.LightField.from_views(values, SPACING, SLOPE, FOCUS, **{"disparity": disparity, **given})
 
 
-@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # the sensor sees beyond the views' pictures
+@pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # the sensor sees beyond the views' pixels
 @pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
 def test_the_picture_is_that_of_the_denser_light_field_and_in_focus_of_views_as_they_are(engine):
     lf = field()
@@ -208,10 +208,10 @@ def test_pieces_have_the_disparities_of_the_whole():
     every_second = lf[::2, ::2]
     maps = every_second.disparity.maps()
     assert maps.extent == (-2.0, 4.0)
-    # Of the given maps, those of views (0, 0), (0, 2) … are (0, 0), (0, 1) … now.
+    # The given maps of views (0, 0), (0, 2) … are now those of (0, 0), (0, 1) …
     place = maps.views.index((1.0, 0.0))
     np.testing.assert_array_equal(maps.values[place], 2 * two_planes()[1][2, 0])
-    part = lf[:, :, 3:5, 0:2]  # shows the far plane alone
+    part = lf[:, :, 3:5, 0:2]  # shows only the far plane
     assert part.disparity.maps().extent == (-1.0, 2.0)
     assert np.ptp(part.disparity.maps().values) == 0
 
@@ -222,7 +222,8 @@ def test_a_map_of_the_middle_view_serves_all():
     one = replace(lf, disparity=two_planes()[1][1, 1])
     one_picture = FAR_OUT_OF_FOCUS.capture(one, between_views="depth").values
     all_pictures = FAR_OUT_OF_FOCUS.capture(lf, between_views="depth").values
-    # The maps of other views follow: what the middle view does not see of the far plane goes on as beside.
+    # The maps of other views follow: parts of the far plane hidden from the middle view continue their
+    # surroundings.
     np.testing.assert_allclose(one_picture, all_pictures, atol=1e-5 * all_pictures.max())
 
 

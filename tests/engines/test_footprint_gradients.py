@@ -1,7 +1,7 @@
-"""From a raster's weights to the numbers of footprints, compiled: as the reference has them, on any plan.
+"""Compiled gradients of a weighted raster to the parameters of footprints equal the reference's, on any plan.
 
-The reference is held by central differences in `test_reference_back`. Here plans are random, or of cameras:
-single precision rounds each product to 6e-8 and sums of hundreds of them to some 1e-6 of the largest: 1e-5.
+`test_reference_back` tests the reference by central differences. Here plans are random, or made for cameras.
+Single precision rounds each product to 6e-8 and sums of hundreds of products to some 1e-6 of the largest: 1e-5.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ AGREEMENT = 1e-5
 
 @dataclass(frozen=True)
 class Drawn:
-    """A plan that is drawn at random.
+    """A random plan.
 
     Args:
         interpolation: of footprints.
-        masks: how many.
-        refine: parts of each sample, each way.
+        masks: number of masks.
+        refine: parts of each sample along each axis.
         shear: of the samples' rows and columns.
-        step: about so many pixels from a sample to the next.
+        step: approximate distance of samples in pixels.
         samples: (rows, columns) of a view.
         opening: see `Footprints`.
-        channels: of the samples; none for no axis of them.
+        channels: of the samples; none without an axis of channels.
         kind: type of the samples.
-        seed: of all that is drawn.
+        seed: of all random numbers.
     """
 
     interpolation: str = "linear"
@@ -52,7 +52,7 @@ class Drawn:
     seed: int = 0
 
     def core(self) -> Footprints:
-        """Taps of any places; one lets no light through, some meet masks elsewhere than others of their column."""
+        """Taps at any places; one has weight zero, some meet masks elsewhere than the rest of their column."""
         draw, (rows, columns), (b, a) = np.random.default_rng(self.seed), self.samples, (2, 3)
         raster = (int(rows * self.step), int(columns * self.step) + 2)
         turn = self.shear * np.array([[0.0, 1.0], [-0.7, 0.0]])
@@ -143,10 +143,10 @@ def test_one_number_alone(part):
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_random_cameras(kind):
-    for seed in (4, 5) if kind == "turned mask" else (0, 1):  # 4×4 views show it black with others
+    for seed in (4, 5) if kind == "turned mask" else (0, 1):  # with other seeds, 4×4 views give a black image
         case = drawn(kind, seed, pixels=10, views=4)
         core = case.camera.compile(case.light_field, method="footprints").core
-        # Scenes are smooth: of what the opening changes, next to nothing is left of the sum.
+        # Scenes are smooth: changes by the opening almost cancel in the sum.
         wanted = [name for name in wanted_of(core) if name != "opening"]
         assert_as_the_reference(core, case.light_field.values, wanted)
 

@@ -1,6 +1,6 @@
-"""Several rasters in one pass over the samples: each is what its own core makes of them.
+"""Several rasters in one pass over the samples: each equals the raster of its own core.
 
-Sums are taken in another order: single precision rounds each to 6e-8 of itself, and hundreds of positive ones to
+Sums have a different order: single precision rounds each to 6e-8 of itself, and hundreds of positive ones to
 less than 1e-6 of the largest.
 """
 
@@ -21,7 +21,7 @@ from vcc.plan.protocol import Partial
 
 AGREEMENT = 1e-6
 COUNT = 5
-"""More than are weighed at once."""
+"""More than the kernels weigh together."""
 
 PLANS = {
     "one mask": Drawn(masks=1),
@@ -33,7 +33,7 @@ PLANS = {
 
 
 def with_other_weights(core: Footprints) -> list[Footprints]:
-    """Each opens and closes other taps; one opens none."""
+    """Each opens and closes different taps; one opens none."""
     draw = np.random.default_rng(5)
     several = [draw.random(core.weights.shape) * draw.integers(0, 2, core.weights.shape) for _ in range(COUNT)]
     several[2] *= 0

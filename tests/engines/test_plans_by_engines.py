@@ -1,7 +1,7 @@
-"""Every engine runs every kind of plan to the same picture, in one piece and in any number of blocks.
+"""Every engine makes the same image for every kind of plan, in one piece and in any number of blocks.
 
-The oracle is ``reference``, whose sums are written out plainly; for blocks it is the picture of the whole, which
-is linear in the samples and thus the sum of the pictures of blocks.
+Oracles: ``reference``, whose sums are written out plainly; for blocks the image of the whole light field, which
+is linear in the samples and thus the sum of the images of blocks.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from vcc.run.drive import Drive, drive
 from vcc.shapes.kernels import Gaussian
 from vcc.shapes.patterns import Circle, CosineSum
 
-# Cameras here ask for what they like.
+# Tests may request any camera: there are no warnings about sampling.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 SHAPE = (5, 4, 9, 11)
 D = 1 / (1 / 50e-3 - 1)
-"""Where a lens of 50 mm focuses what is 1 m away, metres."""
+"""Image distance of a lens of 50 mm focused at 1 m, metres."""
 LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
-# 0.93: no sample lies on the border of a pixel, where rounding decides.
+# 0.93: no sample lies on a pixel's border, where rounding decides.
 SENSOR = vcc.Sensor(D, (11, 13), D * 2e-3 * 0.93)
 AGREEMENT = 1e-5
 """Of the brightest pixel: sums of hundreds of products in single precision, each rounded to 6e-8."""
@@ -57,7 +57,7 @@ def has_detail(plan: Plan) -> bool:
 
 @dataclass(frozen=True)
 class Case:
-    """A camera, how its picture is made, and what the plan must then have in it."""
+    """A camera, the settings of its image, and the required contents of the plan."""
 
     camera: vcc.Camera
     holds: Callable[[Plan], bool]
@@ -133,7 +133,7 @@ CASES = {
 
 
 class FromAnArray:
-    """Samples that are read block by block, as from a disk."""
+    """Samples read block by block, as if from disk."""
 
     def __init__(self, light_field: vcc.LightField) -> None:
         self._values, self._grid = light_field.values, light_field.grid
@@ -196,14 +196,14 @@ def test_arrays_of_other_libraries_give_the_same(name):
 
 
 def limits(plan: Plan, samples: FromAnArray, how: How) -> Iterator[int]:
-    """Bytes that make for rows of views, for some views of a row, and for some rows of pixels of one."""
+    """Memory limits that give rows of views, some views of a row, or some rows of pixels of one view."""
     way = Drive(plan, samples, how)
     need, (_, wide, rows, _) = way.need, way.samples.grid.shape[:4]
     whole, border = need.view * need.times, 1 + need.border
-    kept = 0.0 if plan.views_between is None else 0.25  # goes to views that are read again
+    kept = 0.0 if plan.views_between is None else 0.25  # memory for views that are read again
     for samples_there in (whole * border * (wide + need.border), whole * border * border):
         beside = need.fixed + samples_there
-        # One view at a time is read within so little, or two, which take more.
+        # This limit allows one view at a time, or two, which need more.
         reading = need.with_readers(way.threads, beside + 3 * need.view).reading
         yield int((beside + reading) / (1 - kept)) + 8
     yield int((need.fixed + need.view / rows * 4 * (3 + need.times * border * border)) / (1 - kept)) + 8
@@ -212,7 +212,7 @@ def limits(plan: Plan, samples: FromAnArray, how: How) -> Iterator[int]:
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", list(CASES))
 def test_blocks_add_up_to_the_whole(name, engine):
-    """However little memory there is; the rays are the same ones, so that what is said of them is the same too."""
+    """The rays, and so the estimated error, do not depend on the memory limit."""
     case = CASES[name]
     lf = case.light_field()
     how = replace(case.how, engine=engine, threads=2)
@@ -235,7 +235,7 @@ def test_blocks_add_up_to_the_whole(name, engine):
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_columns_of_views_that_a_stop_keeps_out_are_left_out(engine):
-    """A lens of 3 mm before columns of views at ±1 and ±3 mm: the first and the last one give nothing."""
+    """A lens of 3 mm before columns of views at ±1 and ±3 mm: the first and last columns contribute nothing."""
     case = CASES["a diffuser at the views"]
     narrow = vcc.Camera([replace(LENS, diameter=3 * mm), *case.camera.elements[1:]], SENSOR)
     lf = case.light_field()
@@ -356,13 +356,13 @@ def test_capture_by_a_plan_made_before_gives_the_same_bits(name):
         (
             "rays",
             "uint8",
-        ),  # the loops of rays for double precision are compiled by tests/engines/test_ray_agreement
+        ),  # tests/engines/test_ray_agreement compiles the loops of rays for double precision
         ("rays", "uint16"),
         ("views in between by depth", "uint8"),
     ],
 )
 def test_a_plan_serves_other_samples_of_the_grid_of_any_type(name, dtype):
-    """255 of 8 bits and 65535 of 16 are radiance 1: that is the samples' own affair."""
+    """255 of 8 bits and 65535 of 16 bits both mean radiance 1: the scale is part of the samples."""
     case = CASES[name]
     lf = case.light_field()
     values = lf.values[::-1] * (np.iinfo(dtype).max if dtype != "float64" else 1)
@@ -372,8 +372,8 @@ def test_a_plan_serves_other_samples_of_the_grid_of_any_type(name, dtype):
     by_plan = case.camera.capture(other, case.how, plan=plan).values
     np.testing.assert_array_equal(by_plan, case.camera.capture(other, case.how).values)
     as_floats = case.camera.capture(lf.replaced(lf.values[::-1].copy()), case.how).values
-    # Cut to whole numbers, each is up to 1/255 smaller, and filters raise that to 3.4 times as much; the brightest
-    # pixel of a picture of noise is more than half as bright as radiance 1 would be.
+    # Truncation makes each sample up to 1/255 smaller, and filters amplify that by at most 3.4. The brightest
+    # pixel of an image of noise is more than half as bright as for radiance 1.
     whole = 8 / np.iinfo(dtype).max if dtype != "float64" else 1e-6
     np.testing.assert_allclose(by_plan, as_floats, rtol=0, atol=whole * as_floats.max())
 

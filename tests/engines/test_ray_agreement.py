@@ -1,7 +1,7 @@
-"""Every engine traces the same rays: pictures agree to 1e-5 of the brightest pixel, for every kind of step.
+"""Every engine traces the same rays: images agree to 1e-5 of the brightest pixel, for every kind of step.
 
-The oracle for what a picture *should* be is elsewhere (tests/physics). Places are float64 everywhere, so that rays
-fall on the same side of an edge; samples are added up in float32 by two engines and in float64 by ``reference``.
+Whether the image itself is correct is tested in tests/physics. Places are float64 everywhere, so that rays fall
+on the same side of an edge; two engines sum samples in float32 and ``reference`` in float64.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LIBRARIES = {
 
 @dataclass(frozen=True)
 class Gaps(Element):
-    """Two patterns of cells at once, one of them turned."""
+    """Two patterns of cells together, one of them rotated."""
 
     def faces(self) -> Faces:
         turned = CellApertures(Lattice("hexagonal", 1.5 * mm, 0.3), 0.9)
@@ -177,7 +177,7 @@ def test_views_that_follow_a_parallax_askew():
         np.block([[np.kron(np.eye(2), [[0.8, -0.6], [0.6, 0.8]]), np.zeros((4, 1))], [0, 0, 0, 0, 1]])
     )
     lf = field(samples())
-    # Views that are turned against their grid: the parallax from view to view is not along rows.
+    # Views rotated against their grid: the parallax between views is not along rows.
     askew = vcc.LightField(lf.values, turned @ lf.frame, disparity_range=(0.1, 0.3))
     assert_engines_agree(camera("biprism"), askew)
 
@@ -194,7 +194,7 @@ def test_a_camera_without_anything_but_a_stop_is_aimed_at_exactly():
     assert isinstance(plan.core.aim, Window)
     assert plan.core.aim.disc
     picture = vcc.Camera([LENS], SENSOR).capture(lf, method="rays")
-    # L₀·A/d²; the disc is hit by all rays, so nothing is left to chance
+    # L₀·A/d²; all rays hit the disc, so the result is not random
     assert picture.values[3:5, 3:5] == pytest.approx(np.pi * 9e-6 / D**2, rel=1e-6)
 
 
@@ -203,8 +203,8 @@ def test_lenslets_are_aimed_at_one_by_one_where_that_saves_rays():
     plan = camera("cells, square").compile(lf)
     assert plan.by_rays
     assert isinstance(plan.core.aim, CellWindows)
-    # Without a stop a lenslet is looked through by the slopes that the light field holds: a few of them by narrow
-    # views, all of them by wide ones.
+    # Without a stop, rays through a lenslet cover the slopes in the light field: some slopes with narrow views,
+    # all slopes with wide ones.
     alone = vcc.Camera([microlenses(z=0.0)], SENSOR)
     plan = alone.compile(lf)
     assert plan.by_rays
@@ -220,7 +220,7 @@ def test_gradients_flow_to_the_samples():
     picture.values.sum().backward()
     weight = lf.values.grad
     assert weight is not None
-    # The picture is linear in the samples, so the gradient is the adjoint: <picture, 1> = <samples, gradient>
+    # The image is linear in the samples, so the gradient is the adjoint: <image, 1> = <samples, gradient>
     total = float((weight * lf.values.detach()).sum())
     assert total == pytest.approx(float(picture.values.detach().sum()), rel=1e-5)
 
@@ -252,7 +252,7 @@ def test_the_same_seed_gives_the_same_picture_whatever_the_threads():
 
 
 def test_twice_the_samples_are_the_first_ones_and_as_many_more():
-    # A tolerance that needs one more round takes the block beside the first: together a block of twice the size.
+    # A tolerance that needs one more round uses the block next to the first: together a block of twice the size.
     lf = field(samples())
     cam = camera("cells, hexagonal, turned, with gaps")
     few = cam.capture(lf, samples=16)

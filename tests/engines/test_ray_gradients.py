@@ -1,9 +1,9 @@
-"""What a raster by rays says of all numbers of its plan: against difference quotients of the reference engine.
+"""Gradients of a raster by rays to all parameters of its plan equal difference quotients of the reference engine.
 
-Rays are drawn at fixed points, so a picture is a fixed function of a plan's numbers: smooth but for kinks, where
-look-ups between points go from one pair of points to the next, and for jumps at hard edges, by which derivatives
-pass. A step that changes the picture by a share h of it moves rays by about h samples: of a few hundred rays
-hardly one meets a kink when h is 1e-8, and what is left is the rounding of two pictures, some 1e-16/h.
+Rays are drawn at fixed points, so an image is a fixed function of a plan's parameters. It is smooth except for
+kinks, where interpolation moves from one pair of points to the next, and for jumps at hard edges, which
+derivatives ignore. A step that changes the image by a fraction h moves rays by about h samples: with h = 1e-8,
+hardly one of a few hundred rays meets a kink. The remaining error is the rounding of two images, some 1e-16/h.
 """
 
 from dataclasses import replace
@@ -28,8 +28,8 @@ pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 STEP = 1e-8
 TOLERANCE = 1e-6
-"""Of the sum of what all entries change. Rounding gives 1e-8 at this step, curvature less; one ray of some hundred
-that meets a kink gives 1e-3."""
+"""Fraction of the summed changes of all entries. At this step, rounding gives 1e-8 and curvature less; one ray
+of a few hundred that meets a kink gives 1e-3."""
 
 RANDOM = np.random.default_rng(7)
 SHARES = RANDOM.dirichlet([1, 1, 1], (5, 6)).transpose(2, 0, 1)
@@ -72,7 +72,7 @@ OWN = {
 
 @cache
 def case(name):
-    """(core, samples, weights of the raster) of a small camera that was drawn, or is one of ours."""
+    """(core, samples, weights of the raster) of a small camera, random or one of the cameras above."""
     random = np.random.default_rng(3)
     if name in OWN:
         field = vcc.LightField.from_views(
@@ -91,7 +91,7 @@ def case(name):
 
 
 def _double(core):
-    """The same core with tables in double precision, so that their small steps are as exact as others."""
+    """The same core with tables in double precision, so that small steps in them are exact."""
 
     def doubled(step):
         named = {n: getattr(step, n, None) for n in ("values", "texture", "cumulative", "width")}
@@ -106,7 +106,7 @@ def _double(core):
 
 
 def wanted(core):
-    """Names of all numbers but those that move nothing but a hard edge."""
+    """Names of all parameters except those that only move a hard edge."""
     of_edges = {f"steps[{n}].{name}" for n, step in enumerate(core.steps) for name in EDGES.get(type(step), ())}
     return [
         name
@@ -116,10 +116,10 @@ def wanted(core):
 
 
 def direction(name, value, gradient, random):
-    """Where to step: so that all entries of a matrix count alike, and all entries of a table change alike."""
+    """Directions of steps: entries of a matrix have equal weight, and all entries of a table change equally."""
     sign = random.choice([-1.0, 1.0], value.shape)
     if name == "points":
-        sign[:, :4] = 0  # whole binary digits of these are flipped: they are no smooth numbers
+        sign[:, :4] = 0  # binary digits of these are flipped: they are not continuous
     if value.shape == (5, 5):
         sign[4] = 0
     if value.shape in ((5, 5), (2, 2)):
@@ -130,7 +130,7 @@ def direction(name, value, gradient, random):
     return np.where(np.isfinite(value), sign, 0.0)
 
 
-# With seed 1 a ray meets the edge of a lenslet, where numbers bend.
+# With seed 1 a ray meets the edge of a lenslet, where the function has a kink.
 CASES = [f"{kind}, {2 if kind == 'lenslets' else 1}" for kind in BENT]
 CASES += ["lenses, 1", "one mask, 1", "two masks, 1", "blur, 1", *OWN]
 
@@ -148,7 +148,7 @@ def test_the_reference_agrees_with_difference_quotients(name):
         assert gradient.shape == value.shape
         way = direction(each, value, gradient, random)
         slope, both = float((gradient * way).sum()), float(np.abs(gradient * way).sum())
-        # What changes nothing must not: it is moved by a share of what it is.
+        # Parameters without effect must have zero gradient; they are changed by a fraction of themselves.
         step = STEP * (size / both if both > 0 else float(np.abs(value[np.isfinite(value)]).max(initial=1e-6)))
         changed = [with_parameters(core, {each: value + sign * step * way}) for sign in (1, -1)]
         ahead, behind = (
@@ -161,9 +161,9 @@ def test_the_reference_agrees_with_difference_quotients(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_compiled_rays_agree_with_the_reference(name):
-    """To 1e-5 of the largest entry: tables are in single precision there, all else is in double.
+    """Assert equality to 1e-5 of the largest entry: tables are in single precision there, all else in double.
 
-    What is nothing but rounding of the picture when a number is changed by a share of itself may differ.
+    Differences by rounding of the image, if a parameter is changed by a fraction of itself, are allowed.
     """
     core, values, raster = case(name)
     values = values.astype(np.float32)
@@ -179,7 +179,7 @@ def test_compiled_rays_agree_with_the_reference(name):
 
 
 def test_any_number_of_threads_makes_the_same_bytes():
-    """Of a picture of several tiles, with tables of all kinds."""
+    """An image of several tiles, with tables of all kinds."""
     core, _, _ = case("zeros and cosines")
     random = np.random.default_rng(1)
     core = replace(core, raster_shape=(70, 40), samples=2)

@@ -1,6 +1,6 @@
-"""Rays of a plain lens sharpen the parts of views that they look at, as if views were sharpened as a whole.
+"""Rays of a plain lens sharpen only the parts of views that they read, as if whole views were sharpened.
 
-Oracle: the reference engine, which sharpens all views by NumPy and looks up whole views.
+Oracle: the reference engine, which sharpens all views with NumPy and reads whole views.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_parts_are_looked_up_as_whole_views_are(name, monkeypatch):
     lf, elements, at = CASES[name]
-    # Caches of a kilobyte a view, so that there are many tiles, which overlap.
+    # Caches of a kilobyte per view, so that there are many overlapping tiles.
     monkeypatch.setattr(ray_patches, "CACHE", 2**16)
     monkeypatch.setattr(ray_patches, "MOST", 50)
     plan = vcc.Camera(elements, at).compile(lf, method="rays", samples=16)
@@ -61,8 +61,8 @@ def test_parts_are_looked_up_as_whole_views_are(name, monkeypatch):
     found = parted.recorded()
     assert "prepared" not in vars(parted)  # no filtered copy of the light field is made
     whole = Drive(plan, lf, How())
-    assert isinstance(whole.prepared, np.ndarray)  # looked up where it is there
-    # To rounding: at the border of a part a ray is looked up sample by sample, which adds up in another order.
+    assert isinstance(whole.prepared, np.ndarray)  # reused, as it is sharpened already
+    # Up to rounding: at a part's border rays are looked up sample by sample, with another order of sums.
     assert np.abs(found.values - whole.recorded().values).max() <= 2**-22 * found.values.max()
     # Single precision and sums of 16 rays, each rounded to 2⁻²⁴: below 1e-6 of the largest.
     reference = drive(plan, lf, How(engine="reference")).values

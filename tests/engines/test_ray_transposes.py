@@ -1,8 +1,8 @@
-"""Going backwards through rays is the transpose of tracing them.
+"""The backward pass through rays is the transpose of tracing them.
 
-Oracle: the dot test ⟨w, A x⟩ = ⟨Aᵀ w, x⟩ with random vectors, whose two sides are made by different sums. The
-reference sums in float64: 1e-12. The compiled engine multiplies and adds up packets in float32, where a product of
-three weights is right to 2⁻²²; thousands of rays that err by chance stay far below 1e-6.
+Oracle: the dot test ⟨w, A x⟩ = ⟨Aᵀ w, x⟩ with random vectors; its two sides are different sums. The reference
+sums in float64: 1e-12. The compiled engine multiplies and sums packets in float32: a product of three weights is
+correct to 2⁻²², and random errors of thousands of rays stay far below 1e-6.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def drawn(core: Rays, channels: tuple[int, ...], seed: int = 0) -> tuple[np.ndar
 
 
 def error(engine, core: Rays, channels: tuple[int, ...], beside: int = 0) -> float:
-    """By what the two sides of the dot test differ, as a share of them."""
+    """Relative difference of the two sides of the dot test."""
     kind = np.float64 if engine is reference else np.float32
     samples, weights = drawn(core, channels)
     samples = samples.astype(kind)
@@ -70,7 +70,7 @@ def assert_transposed(core: Rays, channels: tuple[int, ...], beside: int = 0) ->
     assert error(reference, core, channels, beside) < 1e-12
     assert error(numba_cpu, core, channels, beside) < 1e-6
     _, weights = drawn(core, channels, seed=1)
-    values = np.broadcast_to(np.float32(0), (*core.views, *channels))  # of which only the shape is looked at
+    values = np.broadcast_to(np.float32(0), (*core.views, *channels))  # only the shape is used
     plain = reference.back(core, values, weights, beside=beside, threads=1).samples
     fast = numba_cpu.back(core, values, weights, beside=beside, threads=2).samples
     np.testing.assert_allclose(fast, plain, rtol=0, atol=1e-6 * plain.max())
@@ -103,7 +103,7 @@ def test_few_views_and_few_pixels(shape):
 def test_the_same_bytes_for_any_number_of_threads(many, monkeypatch):
     if many:
         monkeypatch.setattr(ray_transpose, "IN_DOUBLE", 0)
-    monkeypatch.setattr(ray_transpose, "KEPT", 2**13)  # some rounds, and tiles that are kept in several pieces
+    monkeypatch.setattr(ray_transpose, "KEPT", 2**13)  # several rounds, and tiles stored in several pieces
     core = made(vcc.Camera([LENS, PRISMS], TILES), field_of((5, 4, 9, 11, 3)))
     samples, weights = drawn(core, (3,))
     assert error(numba_cpu, core, (3,)) < 1e-6
@@ -124,7 +124,7 @@ def test_rounds_of_rays_that_are_kept_do_not_show(monkeypatch):
 @pytest.mark.parametrize("engine", [reference, numba_cpu], ids=["reference", "numba"])
 @pytest.mark.parametrize("between", ["auto", "none"])
 def test_blocks_with_borders_give_what_the_whole_gives(engine, between):
-    """Of each block that runs with its neighbours' views around it, those within count."""
+    """If blocks run with the neighbouring views around them, only gradients inside each block count."""
     core = made(vcc.Camera([LENS, LENSLETS], SENSOR), field_of((5, 4, 9, 11)), between_views=between)
     samples, weights = drawn(core, ())
     whole = engine.back(core, samples, weights, threads=2).samples

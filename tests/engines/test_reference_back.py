@@ -1,4 +1,4 @@
-"""The reference's way back through footprints: dot tests, and central differences by each number of a plan."""
+"""The backward pass of the reference through footprints: dot tests, and central differences by each parameter."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import share_slopes, shares
 from vcc.plan.parameters import parameters, with_parameters
 
-# Cameras here ask for what they like.
+# Tests may request any camera: there are no warnings about sampling.
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 SMALL = (3, 2, 5, 6)
 
 
 def core_of(camera: vcc.Camera, lf: vcc.LightField, **options) -> Footprints:
-    """The middle of a camera's plan, with textures in double precision."""
+    """The core of a camera's plan, with textures in double precision."""
     core = camera.compile(lf, method="footprints", **options).core
     masks = tuple(replace(mask, texture=mask.texture.astype(np.float64)) for mask in core.masks)
     return replace(core, masks=masks)
@@ -48,7 +48,7 @@ def assert_adjoint(core: Footprints) -> None:
     assert found.samples.dtype == np.float64
     assert found.gradients == {}
     product = (found.samples * values).sum()
-    # Sums of n terms in double precision differ by some √n·1e-16 of the root of the sum of their squares.
+    # Sums of n terms in double precision differ by about √n·1e-16 of the root of the sum of their squares.
     assert abs(product - (weights * picture).sum()) <= 1e-12 * np.linalg.norm(weights) * np.linalg.norm(picture)
 
 
@@ -67,8 +67,8 @@ def test_samples_are_the_adjoint(name, interpolation):
 
 
 def assert_differences(core: Footprints, names=None, together: bool = False) -> None:
-    """Central differences of some 1e-5 along a random direction of each number, or of all of them at once. Second
-    derivatives jump where footprints end and in textures, which so small a step seldom meets."""
+    """Central differences of some 1e-5 along a random direction of each parameter, or of all parameters together.
+    Second derivatives jump at the ends of footprints and in textures; such a small step seldom meets a jump."""
     values, draw = light_of(core), np.random.default_rng(7)
     weights, every = weights_of(core, values), parameters(core)
     names = [name for name in names or every if name != "sharpen_samples"]
@@ -77,7 +77,7 @@ def assert_differences(core: Footprints, names=None, together: bool = False) -> 
     assert {name: one.shape for name, one in found.gradients.items()} == {
         name: every[name].shape for name in names
     }
-    # Steps count up to the last sample.
+    # A step is multiplied by up to the last sample's index.
     directions = {
         name: 1e-5 * draw.normal(size=every[name].shape) / (max(core.samples) if "step" in name else 1)
         for name in names
@@ -98,7 +98,7 @@ def assert_differences(core: Footprints, names=None, together: bool = False) -> 
 def test_numbers_are_central_differences(name, interpolation):
     options = {"interpolation": interpolation, "between_views": "none", "refine": 1}
     core = core_of(CAMERAS[name], field(samples(SMALL)), **options)
-    # At the views all samples of a view fall within a ten-millionth of a pixel: what moves them moves hard edges.
+    # A mask at the views: all samples of a view fall within 1e-7 of a pixel, so moving them moves hard edges.
     names = ["scale", "weights"] if name == "at the views" else None
     assert_differences(core, names, together=name != "mask half-way")
 

@@ -1,7 +1,7 @@
-"""The reference engine as it goes: what it counts, in which steps, and what it says that it takes of memory.
+"""The reference engine in detail: its progress, its steps and its estimate of memory.
 
-Oracles: taps and pixels counted; the same derivatives whatever number of rays is followed at once; the sum that
-the module's first lines state, written out sample by sample.
+Oracles: counted taps and pixels; the same derivatives for any number of rays at a time; the sum in the module's
+docstring, written out sample by sample.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def test_the_sum_that_defines_a_picture_written_out(angle, interpolation, sheare
     given = turned(field(samples(SMALL)), angle)
     core = core_of(CAMERAS["three masks"], given, interpolation=interpolation, between_views="none", refine=1)
     core = replace(core, scale=0.7, opening=0.8)
-    if sheared:  # rows of samples fall into rows of pixels, and columns aslant
+    if sheared:  # rows of samples fall on rows of pixels, columns at an angle
         core = replace(core, step=core.step * [[1, 0], [0, 1]] + [[0, sheared], [0, 0]])
     values, (rows, columns) = light_of(core), core.raster_shape
     expected = np.zeros((rows, columns, values.shape[4]))
@@ -46,7 +46,7 @@ def test_the_sum_that_defines_a_picture_written_out(angle, interpolation, sheare
             x, y = core.x[b, a] + xx * k + xy * l, core.y[b, a] + yx * k + yy * l
             row = np.arange(rows, dtype=float)
             down = shares(core.interpolation, row, y, core.row_step, core.opening)
-            # Along the row that is looked at, where the frame shears the pixel grid.
+            # Along the current row, if the frame shears the pixel grid.
             along = x + core.shear * (row - y)
             across = shares(
                 core.interpolation, np.arange(columns)[None, :], along[:, None], core.column_step, core.opening
@@ -71,7 +71,7 @@ def test_progress_counts_taps_of_views_one_by_one_with_light_or_without():
 
 @pytest.mark.parametrize("name", ["plenoptic", "views apart", "round lenslets"])
 def test_as_many_rays_are_followed_at_once_as_may_be(monkeypatch, name):
-    """Pixels one by one, some at a time, or all at once: derivatives are the same to rounding."""
+    """Pixels one by one, some at a time, or all together: derivatives are the same up to rounding."""
     core, values, weights = case(name)
     names, pixels = wanted(core), core.raster_shape[0] * core.raster_shape[1]
     cells = 1
@@ -98,7 +98,7 @@ def test_as_many_rays_are_followed_at_once_as_may_be(monkeypatch, name):
 
 
 def test_rays_beside_those_of_the_first_round_have_derivatives_of_their_own():
-    """A picture is linear in its scale: the derivative to it is the picture by the same rays, weighed."""
+    """An image is linear in its scale: the derivative to it is the weighted image by the same rays."""
     core, values, weights = case("plenoptic")
     found = []
     for beside in (0, 1):
@@ -135,7 +135,7 @@ def test_stated_memory_of_rays():
 
 
 def test_samples_keep_their_bytes_until_they_are_sharpened():
-    """Axes that are swapped and borders that are put move numbers; what is blurred or kept else is float64."""
+    """Swapping axes and adding borders only move numbers; blurred and other samples are float64."""
     values = np.random.default_rng(0).integers(0, 256, (1, 2, 6, 7, 2), dtype=np.uint8)
     border = operators.DarkBorder(((1, 0), (0, 0), (0, 2), (1, 1)))
     moved = reference.prepared((border, operators.SwapPixelAxes()), values, 1)

@@ -1,6 +1,6 @@
-"""The filter that gives back to views what looking them up takes, against sinc(f).
+"""The filter that compensates for the blur of interpolating views, compared with sinc(f).
 
-Oracles: NumPy's sinc, cosines and their means over pixels in closed form, a view that must give itself back.
+Oracles: NumPy's sinc, cosines and their means over pixels in closed form, a view that must be reproduced.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def plan_of(lf: vcc.LightField, **options) -> Plan:
 
 
 def sharpened(plan: Plan, values: np.ndarray, name: str):
-    """Samples as an engine's rays look them up."""
+    """Samples as an engine's rays interpolate them."""
     return engine(name).prepared(plan.before, values, threads=2)
 
 
@@ -61,9 +61,9 @@ def test_the_filter_is_one_over_a_power_of_sinc(sample, power):
     middle, near, far = np.array(SharpenViews.of(sample).weights) / 1024
     f = np.array([0.02, 0.05, 0.1, 0.15])
     factor = middle + 2 * near * np.cos(2 * np.pi * f) + 2 * far * np.cos(4 * np.pi * f)
-    # With h = sin(πf), 1/sinc(f) = arcsin(h)/h = 1 + h²/6 + 3h⁴/40 + 15h⁶/336 + …: its powers have coefficients
-    # that are positive and fall. What is left is at most the sixth order's times 1/(1 − h²), and weights rounded
-    # to 2⁻¹¹.
+    # With h = sin(πf), 1/sinc(f) = arcsin(h)/h = 1 + h²/6 + 3h⁴/40 + 15h⁶/336 + …: the coefficients of its
+    # powers are positive and decrease. The remainder is at most the sixth-order term times 1/(1 − h²), plus the
+    # rounding of weights to 2⁻¹¹.
     series = np.polynomial.Polynomial([1, 1 / 6, 3 / 40, 15 / 336]) ** power
     h = np.sin(np.pi * f)
     left = series.coef[3] * h**6 / (1 - h**2) + 2.0**-11 * (4 * h**2 + 4 * np.sin(2 * np.pi * f) ** 2)
@@ -104,7 +104,7 @@ def test_a_single_row_or_column_is_filtered_by_hand():
     plan = plan_of(field(row, sample="point"))
     values = sharpened(plan, row, "numba")
     middle, near, far = np.array(plan.before[0].weights) / 1024
-    # The other axis is one sample long, so even: its filter does nothing.
+    # The other axis is one sample long, so constant: its filter has no effect.
     np.testing.assert_allclose(values[0, 0, 0], [0, 0, far, near, middle, near, far, 0, 0], atol=1e-7)
 
 
@@ -120,12 +120,12 @@ def test_transposed_or_mirrored_views_are_filtered_alike(kind):
 
 @pytest.mark.parametrize("sample", ["point", "mean"])
 def test_one_view_imaged_onto_pixels_of_its_own_size_gives_itself_back(sample):
-    # Cosines of up to 0.12 cycles a sample along both axes. The picture's pixels are means.
+    # Cosines of up to 0.12 cycles per sample along both axes. The image's pixels are means.
     k = np.arange(40.0)
     f, g = 0.12, 0.09
 
     def view(softened: int) -> np.ndarray:
-        """With the means over the pixels taken so many times."""
+        """With this number of means over the pixels."""
         across = np.sinc(f) ** softened * np.cos(2 * np.pi * f * k)
         down = np.sinc(g) ** softened * np.cos(2 * np.pi * g * k + 1)
         return 1 + 0.4 * down[:, None] * across[None, :]
@@ -141,13 +141,13 @@ def test_one_view_imaged_onto_pixels_of_its_own_size_gives_itself_back(sample):
         way: -20 * np.log10(np.sqrt(np.mean((one - truth) ** 2)) / truth.max()) for way, one in picture.items()
     }
     print(sample, reached)
-    # The filter's remainder at f, 1e-3 and less, of cosines of 0.4/1.4 of the largest value: 65 dB.
+    # The filter's remainder at f, at most 1e-3, of cosines of 0.4/1.4 of the largest value: 65 dB.
     assert reached["sharp"] >= 60
     assert reached["linear"] < 42
 
 
 def record_upright(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarray:
-    # A lens turns its picture by half a turn.
+    # A lens rotates its image by 180°.
     return drive(ByRays(camera, lf.grid, How(**options)).plan, lf).values[::-1, ::-1].astype(float)
 
 
@@ -171,7 +171,7 @@ def test_pictures_agree_between_engines_and_in_pieces(tmp_path, kind, channels):
     assert np.abs(whole.values - other).max() <= 1e-5 * other.max()  # docs/how-it-works: engines agree to 1e-5
     assert np.abs(drive(replace(plan, before=()), lf).values - other).max() > 1e-3 * other.max()
     stored = save_store(lf, tmp_path / "a.zarr", chunks=4)
-    # Blocks of some rows of pixels: what they lack of their neighbours would show.
+    # Blocks of some rows of pixels: missing neighbours would be visible.
     for limit in (10**9, plan.core.points.nbytes * 3 + 140_000):
         picture = drive(plan, stored, How(memory_limit=limit))
         assert np.abs(picture.values - whole.values).max() <= 1e-5 * other.max()
@@ -189,8 +189,8 @@ def test_memory_counts_the_filtered_samples():
     plate = vcc.PhasePlate(vcc.surfaces.Cubic(1.0), diameter=6 * mm)
     bent = vcc.Camera([LENS, plate], CAMERA.sensor)
     more = foretold(bent) - foretold(bent, interpolation="linear")
-    assert more == pytest.approx(2 * values.size / 1e6, abs=1.0)  # 16 bits for 8; each is rounded to a megabyte
-    # A lens alone filters what its rays look at, and keeps no copy.
+    assert more == pytest.approx(2 * values.size / 1e6, abs=1.0)  # 16 bits for 8; both rounded to a megabyte
+    # A plain lens filters only the parts that its rays read, and makes no copy.
     assert foretold(CAMERA) - foretold(CAMERA, interpolation="linear") == pytest.approx(0, abs=1.0)
 
 
@@ -201,7 +201,7 @@ def test_other_interpolations_are_refused():
 
 
 def test_samples_wider_than_any_picture_need_no_room_around_it():
-    """A filter of the picture would look at 2·2·3000 pixels around 20; cubics find the samples as they are."""
+    """A filter of the image would read 2·2·3000 pixels around 20; cubic interpolation reads unfiltered samples."""
     samples = np.arange(33) - 16
     line = 0.5 + 0.4 * np.cos(2 * np.pi * samples / 5.5)
     light_field = field(np.repeat(line[None, :], 33, axis=0)[None, None].astype(np.float32))
@@ -210,6 +210,6 @@ def test_samples_wider_than_any_picture_need_no_room_around_it():
     plan = camera.compile(light_field)
     assert plan.core.raster_shape == sensor.shape
     assert plan.core.interpolation == "cubic"
-    # One view of 2×2 mm at the distance D: radiance × steradian, without cos⁴; the sensor sees the cosine's top.
+    # One view of 2×2 mm at distance D: radiance × steradian, without cos⁴; the sensor sees the cosine's maximum.
     radiance = camera.capture(light_field).to_numpy() / (2 * mm / D) ** 2
     np.testing.assert_allclose(radiance, 0.9, atol=1e-4)

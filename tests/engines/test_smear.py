@@ -1,4 +1,4 @@
-"""The blur that closes gaps between views: it conserves light, and its two ways of computing agree."""
+"""The blur that interpolates between views: it conserves light, and its two implementations agree."""
 
 import numpy as np
 import pytest
@@ -14,9 +14,9 @@ def test_a_tent_has_the_moments_of_a_tent(half_width):
     place = np.arange(len(weights)) - len(weights) // 2
     assert weights.sum() == pytest.approx(1, abs=1e-12)
     assert weights @ place == pytest.approx(0, abs=1e-12)
-    # A tent's variance is w²/6; averaging over pixels adds the pixel's 1/12. Looked at in whole pixels that is
-    # exact for whole w; else Poisson's sum adds, over the harmonics f of the pixels, the slope of sinc²(wf) at
-    # f times the slope 1/f of the pixel's sinc: below (2/π³w)·Σ f⁻³ < 0.08/w.
+    # A tent's variance is w²/6; averaging over pixels adds the pixel's 1/12. In whole pixels, that is exact for
+    # whole w; else Poisson's sum adds, over the harmonics f of the pixels, the slope of sinc²(wf) at f times the
+    # slope 1/f of the pixel's sinc: below (2/π³w)·Σ f⁻³ < 0.08/w.
     rest = 1e-9 if half_width == round(half_width) else 0.08 / half_width
     assert weights @ place**2 == pytest.approx(half_width**2 / 6 + 1 / 12, abs=rest)
 
@@ -26,7 +26,7 @@ def test_a_tent_has_the_moments_of_a_tent(half_width):
 def test_blurring_is_the_product_with_the_tents_matrix(half_width, axis):
     raster = np.random.default_rng(0).random((150, 160, 2))
     weights, reach = tent(half_width), len(tent(half_width)) // 2
-    # Weight w of pixel q comes from pixel q − (w − reach), where there is one.
+    # Weight w of pixel q comes from pixel q − (w − reach), if that exists.
     truth = np.zeros_like(raster)
     there, here = np.moveaxis(raster, axis, 0), np.moveaxis(truth, axis, 0)
     for w, weight in enumerate(weights):

@@ -1,4 +1,4 @@
-"""Pictures are the same bytes on any number of threads, and as many are opened as are asked for."""
+"""Images are the same bytes for any number of threads, and the requested number of threads is started."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def field(**given) -> vcc.LightField:
 
 
 def near_and_far() -> vcc.LightField:
-    """A near and a far half, so that other views are looked at too."""
+    """A near and a far half, so that other views are read, too."""
     return field(disparity=np.where(np.arange(50) < 25, 2.0, -1.0) * np.ones((40, 1)))
 
 

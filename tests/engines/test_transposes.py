@@ -1,7 +1,7 @@
-"""From a raster's weights back to the samples: the transpose of what an engine makes of them.
+"""Gradients of a weighted raster to the samples: the transpose of an engine's `run`.
 
-Oracles: the dot test ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ for random x and y, with the raster by the fast engine and by the plain
-one; and the matrix A itself, which the plain engine gives where each sample is a channel of its own.
+Oracles: the dot test ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ for random x and y, with the raster by the fast engine and by the
+plain one; and the matrix A itself, which the plain engine gives if each sample is a separate channel.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")
 
 NUMBA, REFERENCE = engine("numba"), engine("reference")
 ROUNDING = 1e-6
-"""Of ‖A x‖·‖y‖: single precision rounds each product to 6e-8, and errors of sums of many mostly cancel."""
+"""Fraction of ‖A x‖·‖y‖: single precision rounds each product to 6e-8, and errors of long sums mostly cancel."""
 
 FOCUS = 1 / (1 / 50e-3 - 1)
 LENS = vcc.Lens(focal_length=50 * mm, diameter=6 * mm)
@@ -67,12 +67,12 @@ def core_of(camera: vcc.Camera, lf: vcc.LightField, **options) -> Footprints:
 
 
 def refined(core: Footprints, times: int) -> Footprints:
-    """The same with samples divided, and views as they are: a plan divides the one or the other."""
+    """The same with subdivided samples and unfiltered views: a plan does one or the other."""
     return replace(core, refine=times)
 
 
 def of_some_taps(core: Footprints) -> Footprints:
-    """Where views are divided: several taps for each, and none of them in some rows and columns."""
+    """Divided views: several taps for each, and none in some rows and columns."""
     assert len(core.view_rows) > len(np.unique(core.view_rows))
     kept = np.random.default_rng(4).random(core.weights.shape) < 50 / core.taps_used
     return replace(core, weights=core.weights * kept)
@@ -110,7 +110,7 @@ def assert_transposed(core: Footprints, *channels: int) -> None:
 @pytest.mark.parametrize("kind", AFFINE)
 def test_random_cameras(kind):
     for seed, interpolation in enumerate([None, "nearest", "linear", "cubic"]):
-        case = drawn(kind, seed + 4 * (kind == "turned mask"), pixels=10, views=4)  # others are black
+        case = drawn(kind, seed + 4 * (kind == "turned mask"), pixels=10, views=4)  # other seeds are black
         options = {} if interpolation is None else {"interpolation": interpolation}
         core = core_of(case.camera, case.light_field, **options)
         assert core.separable or kind.startswith("turned")
@@ -129,7 +129,7 @@ def test_random_cameras_before_light_fields_that_are_turned_or_divided(kind):
 @pytest.mark.parametrize(("refine", "roll"), [(1, 0.0), (3, 0.0), (1, -0.7), (2, -0.7)])
 @pytest.mark.parametrize("name", CAMERAS)
 def test_the_transpose_is_that_of_the_matrix(name, refine, roll):
-    """Every number of it, for any number of channels."""
+    """Every entry of the matrix, for any number of channels."""
     shape = (3, 2, 4, 5)
     core = refined(core_of(CAMERAS[name], field(shape, roll)), refine)
     assert core.separable == (roll == 0)
@@ -143,7 +143,7 @@ def test_the_transpose_is_that_of_the_matrix(name, refine, roll):
             np.einsum("yxn,yxc->nc", a, b).reshape(*shape, *channels)
             for a, b in ((matrix, y), (abs(matrix), abs(y)))
         )
-        # Single precision rounds products of weights, shares and masks, and sums of as many as there are pixels.
+        # Single precision rounds products of weights, shares and masks, and sums with one term per pixel.
         assert (abs(back(core, expected.shape, y) - expected) <= 4e-6 * size + 1e-7 * size.max()).all()
 
 
@@ -190,7 +190,7 @@ def test_progress_gets_to_the_total_and_never_goes_back(roll):
     assert done[-1] == core.taps_used
 
 
-# --- what is done to samples before ---
+# --- operators before the core ---
 
 BEFORE = {
     "sharpened": [SharpenViews.of("point")],
@@ -220,7 +220,7 @@ def test_the_way_back_through_what_is_done_before(name, shape):
 
 
 def test_bytes_are_weighed_by_the_caller_with_what_their_numbers_stand_for():
-    """⟨A x, y⟩ for bytes x, whose sharpened numbers stand for 2⁻⁵ of a sample's, rounded to half of one."""
+    """⟨A x, y⟩ for bytes x; their sharpened values are in units of 2⁻⁵ of a sample's, rounded to half a unit."""
     before = BEFORE["sharpened"]
     x = np.random.default_rng(0).integers(0, 256, (2, 2, 20, 30), dtype=np.uint8)
     ahead = NUMBA.prepared(before, x, 2)

@@ -1,9 +1,9 @@
-"""Pictures wide and high enough for the fast engine's vectors, bands and tiles to meet their borders.
+"""Images wide and high enough to reach the borders of the fast engine's vectors, bands and tiles.
 
-The oracle is the plan's sum written out by its tables of shares, as products of matrices in double precision; the
-sums differ by rounding in single precision, 6e-8 of each of some hundred terms that are alike in size: 1e-6. Their
-errors are of either sign, hence 6e-8·√100 of the largest; a filter of the picture adds those of neighbouring
-pixels, by the root of the sum of its squared weights: 2.1 or 2.2 along each axis where samples are larger than
+The oracle is the plan's sum written out with its tables of shares, as matrix products in double precision. The
+sums differ by rounding in single precision, 6e-8 of each of some hundred terms of similar size: 1e-6. Their
+errors have either sign, hence 6e-8·√100 of the largest. A filter of the image adds the errors of neighbouring
+pixels, by the root of the sum of its squared weights: 2.1 or 2.2 along each axis if samples are larger than
 pixels.
 """
 
@@ -73,7 +73,7 @@ def band_matrix(weights: np.ndarray, pixels: int, guard: int) -> np.ndarray:
 
 
 def expected(plan: Plan, values: np.ndarray) -> np.ndarray:
-    """The picture of a plan whose rows and columns part and whose samples are not divided, by matrices."""
+    """The image of a plan with separable rows and columns and without subdivision, by matrices."""
     core = plan.core
     nt, ns = core.samples
     samples = values.reshape(*values.shape[:2], nt, ns, -1).astype(float)
@@ -131,9 +131,9 @@ def test_samples_of_any_type(dtype, masks):
 @pytest.mark.parametrize("inverted", [True, False])
 @pytest.mark.parametrize("masks", [0, 1])
 def test_pixels_of_any_size_on_bands_of_rows(size, inverted, masks):
-    # More rows than a band has, and no whole number of tiles; many views, in groups and one left over.
+    # More rows than in a band, and not a multiple of a tile; many views, in groups and one left over.
     lf = field((9, 2, 83, 90))
-    if not inverted:  # samples kept in the order in which they meet the sensor
+    if not inverted:  # samples in the order in which they fall on the sensor
         lf = lf[:, :, ::-1, ::-1]
         lf = lf.replaced(np.ascontiguousarray(lf.values))
     plan = camera((149, 101), size, masks).compile(lf, refine=1, between_views="none")
@@ -143,7 +143,7 @@ def test_pixels_of_any_size_on_bands_of_rows(size, inverted, masks):
 
 @pytest.mark.parametrize("channels", [1, 3])
 def test_taps_that_look_masks_up_where_others_do_not(channels):
-    """Cells of views cut by a rim are looked up elsewhere than the rest of their row and column of views."""
+    """Cells of views cut by a rim are at other places than the rest of their row and column of views."""
     lf = field((5, 4, 21, 66, channels))
     plan = camera((22, 67), 1.07, 2).compile(lf, refine=1)
     rng = np.random.default_rng(1)

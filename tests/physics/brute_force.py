@@ -4,10 +4,10 @@ Nothing here comes from `vcc`. A pixel's value is the mean over its area of
 
     I(x) = ∫∫ L(ray from aperture point a to sensor point x) · ∏ masks on the way  dA / d²
 
-with the thin lens at z = 0. The aperture integral is a Gauss-Legendre rule in the stop's own
-coordinates (polar for a round stop, Cartesian for a square one), so no node is cut by the rim, and
-the pixel's mean is a 2 × 2 Gauss-Legendre rule. Tests that rely on it show that halving the rule over
-the stop leaves its pictures alike to more than 60 dB.
+with the thin lens at z = 0. The aperture integral is a Gauss-Legendre rule in the stop's own coordinates (polar
+for a round stop, Cartesian for a square one), so that the rim cuts no node. The mean over a pixel is a 2 × 2
+Gauss-Legendre rule. Tests that rely on it check that halving the rule over the stop changes its images by less
+than 60 dB below the peak.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Texture:
         return total
 
     def _along_axes(self, x: Array, y: Array) -> Array:
-        """The same of a row of x and a column of y: all waves at once, as a product of matrices."""
+        """The same for a row of x and a column of y: all waves together, as a matrix product."""
         amplitude, fx, fy, phase = np.array(self.waves).reshape(-1, 4).T
         along, down = 2 * np.pi * fx[:, None] * x + phase[:, None], 2 * np.pi * y * fy
         of_rows = np.concatenate([np.cos(down), -np.sin(down)], axis=1)
@@ -97,7 +97,7 @@ class Scene:
 def views(
     scene: Scene, shape: tuple[int, int, int, int], spacing: float, slope: float, focus: float = np.inf
 ) -> Array:
-    """What a planar array of parallel pinhole cameras sees: samples (v, u, t, s) at single rays."""
+    """The light field of a planar array of parallel pinhole cameras: samples (v, u, t, s) at single rays."""
     nv, nu, nt, ns = shape
     u = ((np.arange(nu) - (nu - 1) / 2) * spacing)[None, :, None, None]
     v = ((np.arange(nv) - (nv - 1) / 2) * spacing)[:, None, None, None]
@@ -133,8 +133,8 @@ class ThinLensCamera:
         distance: of the sensor.
         shape: (rows, columns) of pixels.
         pitch: of the pixels.
-        masks: (z, transmission of x and y in metres).
-        points: Gauss-Legendre points a pixel, each way.
+        masks: (z, transmission as a function of x and y in metres).
+        points: Gauss-Legendre points per pixel, along each axis.
     """
 
     focal_length: float

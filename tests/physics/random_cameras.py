@@ -1,13 +1,15 @@
-"""Random cameras of all elements, and closed-form scenes before them: what the laws and brute force are held on.
+"""Random cameras with all elements, and closed-form scenes in front of them, for the laws and for brute force.
 
-Everything follows from a kind and a seed. What is drawn: elements in any order along the axis, decentred and out
-of focus, at the entrance plane, at the lens, mid-way, against the sensor and a little before it; stops within the
-grid of views, or none; views that converge or are parallel, flown or not, closer along one axis than along the
-other; pixels of any proportions, smaller and larger than samples; floating point and bytes, one channel or three.
+Everything follows from a kind and a seed. Random are: elements in any order along the axis, decentred and
+defocused, at the entrance plane, at the lens, in mid-path, against the sensor and a little in front of it; stops
+within the grid of views, or none; views that converge or are parallel, propagated or not, denser along one axis
+than along the other; pixels of any aspect ratio, smaller and larger than samples; floating point and bytes, one
+channel or three.
 
-Views are so dense that neighbouring views' pictures of a scene lie less than `GAP` pixels (or samples, where these
-are larger) apart on the sensor, and periods are so long that samples carry them (`FINEST`): further apart or
-finer, the light field does not say what lies between, and no picture of it could be held against the truth.
+Views are so dense that neighbouring views' images of a scene are less than `GAP` pixels (or samples, if these
+are larger) apart on the sensor, and periods are so long that samples resolve them (`FINEST`). With larger gaps
+or finer periods, the light field would not determine the image, and no comparison with the truth would be
+possible.
 """
 
 from __future__ import annotations
@@ -29,11 +31,11 @@ from vcc.shapes import kernels, patterns, surfaces
 Array = NDArray[np.float64]
 
 GAP = 0.75
-"""Pixels (samples, where larger) between neighbouring views' pictures of what is furthest out of focus."""
+"""Pixels (samples, if larger) between neighbouring views' images of the plane that is furthest out of focus."""
 FINEST = 5.5
 """Shortest period of a scene in samples and in pixels, whichever are larger."""
 MARGIN = 4
-"""Samples around what the camera's rays ask for: as many as any interpolation or filter may reach."""
+"""Samples around those that the camera's rays read: the largest reach of any interpolation or filter."""
 
 AFFINE = (
     "lenses",
@@ -45,11 +47,26 @@ AFFINE = (
     "turned lenses",
     "turned mask",
     "blur",
+    "angle filter",
+    "two terms",
 )
 """Kinds of cameras that are made of footprints."""
-BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask")
+BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask", "louvre")
 """Kinds that are traced."""
-KINDS = AFFINE + BENT
+DIRECTED = ("angle filter", "two terms", "louvre")
+"""Kinds that transmit by direction."""
+KINDS = tuple(kind for kind in AFFINE + BENT if kind not in DIRECTED) + DIRECTED
+
+
+@dataclass(frozen=True)
+class MaskBehind(vcc.Element):
+    """An element of a user's: it transmits as a mask does that stands ``ahead`` metres behind it."""
+
+    pattern: Any
+    ahead: float
+
+    def faces(self) -> vcc.Faces:
+        return vcc.Faces(terms=(vcc.Term.behind(self.pattern, self.ahead),))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,16 +75,16 @@ class Case:
 
     Args:
         kind: one of `KINDS`.
-        seed: what was drawn follows from both.
+        seed: kind and seed determine the case.
         camera: any.
         scene: in closed form at z = 0.
         frame: 5×5 at z = 0.
         shape: (v, u, t, s).
-        flown: metres since the plane of the views.
+        flown: propagation distance from the plane of the views, metres.
         sample: ``"mean"`` or ``"point"``.
         bytes: whether samples are 8-bit.
-        channels: None, or how many; each is the scene times a factor.
-        disparities: (lowest, highest) of the scene, pixels a view along u.
+        channels: None, or their number; each is the scene times a factor.
+        disparities: (lowest, highest) of the scene, pixels per view along u.
     """
 
     kind: str
@@ -97,7 +114,7 @@ class Case:
         return vcc.LightField(held, vcc.Affine(self.frame), self.disparities, self.sample)
 
     def described(self) -> str:
-        """What was drawn, in a line."""
+        """The parameters of the case, in a line."""
         sensor = self.camera.sensor
         parts = [
             f"{each.kind} z={each.z * 1e3:.4g}mm"
@@ -125,12 +142,12 @@ def disparity_along(frame: Array, vergence: float, axis: int) -> float:
 
 
 def drawn(kind: str, seed: int, pixels: int = 32, views: int = 17) -> Case:
-    """A random camera of a kind before a random scene.
+    """A random camera of a kind in front of a random scene.
 
     Args:
         kind: one of `KINDS`.
-        seed: of everything.
-        pixels: about so many a side.
+        seed: determines the case.
+        pixels: approximate number per side.
         views: likewise.
     """
     return _Drawing(kind, seed, pixels, views).case()
@@ -326,6 +343,9 @@ class _Drawing:
             "turned lenses": lambda: [],
             "turned mask": lambda: [self._mask()],
             "blur": lambda: [self._diffuser()],
+            "angle filter": lambda: [self._angle_filter()],
+            "two terms": lambda: [self._angle_filter(), self.one_of(self._mask_behind, self._mask)()],
+            "louvre": lambda: [self._louvre()],
             "facets": lambda: [self._facets()],
             "plate": lambda: [self._plate()],
             "lenslets": lambda: [self._lenslets()],
@@ -389,6 +409,39 @@ class _Drawing:
         half = self._beam(z)
         pattern, width, height = self._pattern(half, finest)
         return vcc.Mask(pattern, width=width, height=height, z=z, decentre=self.off_axis(0.2 * half))
+
+    def _directions(self) -> tuple[float, float]:
+        """Half the range of slopes behind the lens, and by how much they differ from view to view."""
+        away = self.sensor.z - self.lens_z
+        return (self._beam(self.lens_z) + max(self.sensor.size) / 2) / away, min(self.spacing) / away
+
+    def _angle_filter(self) -> Any:
+        half, step = self._directions()
+        pattern, width, height = self._pattern(half, 0.4 * step)
+        if isinstance(pattern, np.ndarray):
+            pattern = patterns.Cells(pattern, width, height)
+        elif self.chance(0.3):
+            pattern = vcc.patterns.AngularFringes(
+                self.between(2, 6) / half, self.between(0, 6), self.between(0.5, 1), self.between(0, 3)
+            )
+        z = max(self._place(), self.optics[-1].z, self.lens_z)
+        z = max(z, max(each.z + each.length for each in self.optics))
+        return vcc.AngleFilter(pattern, z=z, decentre=self.off_axis(1 * mm))
+
+    def _mask_behind(self) -> Any:
+        """A mask some way behind the place where it is listed, as one term of an element of the user's."""
+        mask = self._mask(self.between(0.2, 0.9) * self.sensor.z)
+        ahead = self.between(0.1, 0.9) * (mask.z - max(each.z + each.length for each in self.optics))
+        pattern = mask.faces().transmission
+        return MaskBehind(pattern, max(ahead, 0.0), z=mask.z - max(ahead, 0.0), decentre=mask.decentre)
+
+    def _louvre(self) -> Any:
+        z = self.lens_z + self.between(0.0, 0.9) * (self.sensor.z - self.lens_z)
+        pitch = self.between(0.3, 1.5) * self._beam(z)
+        height = pitch * self.between(0.3, 1.2) / self._directions()[0]
+        wall = pitch * self.one_of(0.0, self.between(0, 0.4))
+        turn = self.one_of(0.0, self.between(0, 3))
+        return vcc.Louvre(pitch, height, wall, turn, z=z, decentre=self.off_axis(0.5 * pitch))
 
     def _two_masks(self) -> list[Any]:
         first = self._mask()

@@ -1,19 +1,19 @@
-"""A third independent tracer: brute force for cameras that a generator draws, whatever they are made of.
+"""A third independent tracer: brute force for random cameras with any elements.
 
-Of `vcc` only the numbers of a camera are read: sizes, places, focal lengths, tables. What they do to a ray is
-written out here by hand. A pixel's value is the mean over its sensitive area of
+It reads only the parameters of a camera from `vcc`: sizes, places, focal lengths, tables. Their effect on a ray
+is written out here by hand. A pixel's value is the mean over its sensitive area of
 
     I(x) = ∫∫ L(ray from aperture point a to sensor point x) · ∏ transmissions  ds dt,   ds dt = J da db
 
 over the aperture of the smallest solid angle, a stop or the grid of views as a rectangle; J is the same for all
-rays where optics are affine. Scenes are sums of plane waves in ray space: their means are known in closed form.
+rays if optics are affine. Scenes are sums of plane waves in ray space, with means in closed form.
 
-`Bench.by_means` is for affine optics along both axes. Pixel and aperture are cut into strips, and what a strip
-of both sees of each wave and of each mask along an axis is taken as its *exact mean* (a mask's edge is met by a
-distribution with the shape of a trapezium), so that only what two of them do together within a strip is left
-out: second order in its width, or first where edges of masks in two planes fall together.
+`Bench.by_means` is for affine optics along both axes. Pixel and aperture are cut into strips. Each wave and each
+mask along an axis is replaced by its *exact mean* over a strip of both (a mask's edge is averaged over a
+trapezoidal distribution). Only joint effects of two of them within a strip are left out: second order in its
+width, or first order if edges of masks in two planes coincide.
 `Bench.by_rays` is for everything: points of a scrambled Sobol' sequence over pixel, aperture and scatterers.
-Both state their own error: from halving all strips, and from two independent halves of the points.
+Both report their own error: from halving all strips, and from two independent halves of the points.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from scipy.stats import qmc
 
 Array = NDArray[np.float64]
 Widths = tuple[float, float]
-"""Lengths of two boxes: convolved, they are what a strip of pixel and aperture throws on a plane along an axis."""
+"""Lengths of two boxes: their convolution is a strip of pixel and aperture, projected on a plane along an axis."""
 
 
 MOST_STRIPS = 256
-"""Strips of a pixel and of the aperture together, each way, beyond which `Bench.by_means` gives up."""
+"""Largest number of strips of a pixel and of the aperture together, along each axis, for `Bench.by_means`."""
 
 # -- scenes
 
@@ -142,9 +142,9 @@ def _running_share(x: Array, widths: Widths) -> Array:
 
 
 class Opening:
-    """What lets light through: at points, or its mean over strips (trapezia along x and y).
+    """Transmission: at points, or its mean over strips (trapezia along x and y).
 
-    ``bounds`` are (x, y, half width, half height) outside which all is dark, None where nothing bounds it.
+    ``bounds`` are (x, y, half width, half height) outside which it is dark, None without bounds.
     """
 
     bounds: tuple[float, float, float, float] | None = None
@@ -374,14 +374,14 @@ class Lattice:
 
 @dataclass
 class Sheet:
-    """A plane of the camera: the step that leads to it, and what it does by position.
+    """A plane of the camera: the step that leads to it, and its effect by position.
 
     Args:
-        step: (4, 5), rays just behind the sheet before to just before this one.
-        affine: (4, 5) of what it adds to rays, or None.
-        bend: (Δs, Δt) of places, or None, with bounds of both.
-        openings: all that light must pass.
-        scatter: (δs, δt) of three even numbers and places, or None, with bounds of both.
+        step: (4, 5), from rays just behind the sheet before to rays just before this one.
+        affine: (4, 5) map added to rays, or None.
+        bend: (Δs, Δt) as functions of position, or None, with bounds of both.
+        openings: all openings that light must pass.
+        scatter: (δs, δt) as functions of three uniform numbers and positions, or None, with bounds of both.
     """
 
     step: Array
@@ -443,6 +443,16 @@ def _pattern(pattern: Any, middle: tuple[float, float]) -> list[Opening]:
             return [Cosines(x, y, periods, pattern.harmonics, pattern.phase)]
         case "FunctionPattern":
             return [Smooth(x, y, pattern.function)]
+        case "Bounded":
+            return _pattern(pattern.pattern, middle) + _sheet_of(pattern.width, pattern.height, middle)
+        case "AngularFringes":
+            along = np.array([np.cos(pattern.rotation), np.sin(pattern.rotation)])
+
+            def fringes(s: Array, t: Array) -> Array:
+                angle = np.arctan(along[0] * s + along[1] * t)
+                return np.asarray((1 + pattern.modulation * np.cos(pattern.frequency * angle + pattern.phase)) / 2)
+
+            return [Smooth(0.0, 0.0, fringes)]
     raise NotImplementedError(type(pattern).__name__)
 
 
@@ -596,7 +606,39 @@ def _sheets(element: Any) -> list[Sheet]:
             return [Sheet(here, openings=openings, scatter=lambda xi, eta, *_: draw(xi, eta), reach=reach)]
         case "CodedDiffuser":
             return [_coded(element)]
+        case "AngleFilter":
+            # Slopes as places, and back: what stands there is told apart by direction alone.
+            swapped = np.eye(4, 5)[[2, 3, 0, 1]]
+            return [Sheet(swapped, openings=_pattern(element.pattern, (0.0, 0.0))), Sheet(_undone(swapped))]
+        case "MaskBehind":
+            ahead = _flight(element.ahead)
+            return [Sheet(ahead, openings=_pattern(element.pattern, middle)), Sheet(_undone(ahead))]
+        case "Louvre":
+            return _louvre(element)
     raise NotImplementedError(type(element).__name__)
+
+
+def _louvre(element: Any) -> list[Sheet]:
+    """Rays in a plane of (place across the walls where they enter, place where they leave, …), and back."""
+    x0, y0 = element.decentre
+    cosine, sine = np.cos(element.rotation), np.sin(element.rotation)
+    matrix = np.array(
+        [
+            [cosine, sine, 0, 0],
+            [cosine, sine, element.height * cosine, element.height * sine],
+            [-sine, cosine, 0, 0],
+            [0, 0, -sine, cosine],
+        ]
+    )
+    step = np.column_stack([matrix, -matrix @ [x0, y0, 0, 0]])
+    gap = element.pitch - element.wall
+
+    def same_gap(entered: Array, left: Array) -> Array:
+        one, other = np.rint(entered / element.pitch), np.rint(left / element.pitch)
+        inside = np.maximum(np.abs(entered - one * element.pitch), np.abs(left - other * element.pitch)) <= gap / 2
+        return np.asarray((one == other) & inside, dtype=np.float64)
+
+    return [Sheet(step, openings=[Smooth(0.0, 0.0, same_gap)]), Sheet(_undone(step))]
 
 
 def _first_order_sheets(element: Any) -> list[Sheet]:
@@ -729,7 +771,7 @@ class Bench:
         here = -flown
         for element in camera.elements:
             added = _sheets(element)
-            added[0].step = _flight(element.z - here)
+            added[0].step = _then(added[0].step, _flight(element.z - here))
             self.sheets += added
             here = element.z + element.length
         sensor = camera.sensor

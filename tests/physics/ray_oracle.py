@@ -1,19 +1,19 @@
 """A second independent tracer, for optics that are not affine: plain rays through plain functions.
 
-Nothing here comes from `vcc`. A camera is a list of thin elements, each a few functions of position written out by
-the test: what is added to a ray's slope (`bend`), which share of light passes (`share`), how light is scattered
-(`scatter`, by inverse distribution functions of numbers from NumPy's generator). A pixel's value is the mean over
-its sensitive area of
+Nothing here comes from `vcc`. A camera is a list of thin elements. Each is a few functions of position that the
+test writes out: the change of a ray's slope (`bend`), the transmitted share (`share`), the scattering
+(`scatter`, by inverse distribution functions of numbers from NumPy's generator). A pixel's value is the mean
+over its sensitive area of
 
     I(x) = ∫∫ L(ray traced back from x) · Π shares  ds dt
 
-`Bench.picture` traces rays back from the sensor towards a rectangle that takes in all that can arrive.
-`Bench.shot` sends rays forwards from the entrance plane and counts what falls into each pixel, which knows nothing
-of solid angles at the sensor. Scenes are those of `brute_force`, in closed form.
+`Bench.picture` traces rays back from the sensor towards a rectangle that includes all incoming light.
+`Bench.shot` traces rays forward from the entrance plane and counts those that fall into each pixel, without
+solid angles at the sensor. Scenes are those of `brute_force`, in closed form.
 
-Each pair of numbers (place in the pixel, place in the rectangle, what a diffuser does) is drawn one from each
-square of an n × n grid, and the pairs are matched at random: unbiased, with less noise than plain random
-numbers. The noise is known from two runs (`measured`), not assumed.
+Each pair of numbers (place in the pixel, place in the rectangle, scattering by a diffuser) is drawn one from
+each square of an n × n grid, and the pairs are matched at random: unbiased, with less noise than plain random
+numbers. The noise is measured by two runs (`measured`), not assumed.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ Slopes = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclass(frozen=True)
 class Thin:
-    """A thin element at z. What it does depends on the place (x, y) in metres on the camera's axes.
+    """A thin element at z. Its effect depends on the position (x, y) in metres in the camera's axes.
 
     Args:
-        z: place on the axis.
+        z: position on the axis.
         bend: slopes added to a ray, (Δs, Δt) of (x, y).
-        share: share of light that passes, of (x, y).
-        scatter: (δs, δt) of (ξ, η, ζ, x, y), with ξ, η, ζ even in 0 … 1.
+        share: transmitted share of light, of (x, y).
+        scatter: (δs, δt) of (ξ, η, ζ, x, y), with ξ, η, ζ uniform in 0 … 1.
     """
 
     z: float
@@ -59,11 +59,12 @@ class Bench:
         z: of the sensor.
         shape: (rows, columns) of pixels.
         pitch: of the pixels, metres.
-        aim: (z, half width, half height) of a rectangle in a plane before the sensor with nothing but free flight
-            between; no light arrives from beyond it. It stands on the axis, or moves with the pixel (`follow`).
-        follow: place of the rectangle's middle, as a factor of the place on the sensor.
+        aim: (z, half width, half height) of a rectangle in a plane in front of the sensor, with only free
+            propagation between; no light arrives from outside it. It is centred on the axis, or moves with the
+            pixel (`follow`).
+        follow: position of the rectangle's middle, as a factor of the position on the sensor.
         decentre: of the sensor, (x, y).
-        side: of the square in which a pixel is sensitive, as a share of the pitch.
+        side: of the square in which a pixel is sensitive, as a fraction of the pitch.
     """
 
     elements: Sequence[Thin]

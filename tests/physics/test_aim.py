@@ -1,9 +1,9 @@
-"""Rays find the light that there is, wherever lenses, prisms, stops and the light field itself lead or bound them.
+"""Rays find all incoming light, wherever lenses, prisms, stops and the light field bend or bound it.
 
-Oracles: areas seen from a point, in closed form; and, along each axis, an integral over the entrance plane through
-2×2 ray matrices (Hecht, *Optics*, section 6.2) multiplied out here: with x = A·u + B·s + e at the sensor, light
-from place u arrives there in slopes ds' = du/|B|, so that I(x) = ∫ L(u, (x − A·u − e)/B) du/|B| over the grid of
-views.
+Oracles: areas seen from a point, in closed form; and, along each axis, an integral over the entrance plane
+through 2×2 ray matrices (Hecht, *Optics*, section 6.2) multiplied out here: with x = A·u + B·s + e at the
+sensor, light from place u arrives there in slopes ds' = du/|B|, so that I(x) = ∫ L(u, (x − A·u − e)/B) du/|B|
+over the grid of views.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ def ones(views: int, spacing: float, slopes: float, pixels: int = 8) -> vcc.Ligh
 
 
 RINGS = (3.5, 4)
-"""How far from the border of a light field of ones footprints are even: so many samples and so many pixels.
+"""Distance from the border of a light field of ones at which footprints are uniform: in samples and in pixels.
 
-Cubic splines add up to 1 as far as one sample beyond the last one's middle, a sample and a half from the border,
-and the filter reaches two samples and at most four pixels further (`vcc.plan.sharpening.along_axis`).
+Cubic splines sum to 1 up to one sample beyond the centre of the last one, a sample and a half from the border.
+The filter reaches two samples and at most four pixels further (`vcc.plan.sharpening.along_axis`).
 """
 
 
@@ -40,7 +40,7 @@ def clear(width: float, height: float | None = None, z: float = 0.0) -> vcc.Mask
 
 
 def captured(camera: vcc.Camera, lf: vcc.LightField, **options) -> vcc.Image:
-    """A picture, whatever it is warned of."""
+    """An image, without warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", vcc.ResultWarning)
         return camera.capture(lf, **options)

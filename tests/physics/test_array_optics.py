@@ -1,8 +1,8 @@
 """Arrays, biprisms and pyramids against closed forms, by single rays through a camera.
 
-The closed forms are lines drawn by hand (a ray through the middle of a lens goes straight on) and the thin-lens
-equation. Rays are traced in float64 through at most three elements: 1e-12 of the largest number involved leaves
-room for rounding alone.
+The closed forms are lines drawn by hand (a ray through the middle of a lens is not bent) and the thin-lens
+equation. Rays are traced in float64 through at most three elements: 1e-12 of the largest number only allows for
+rounding.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A piece of a light field is a light field, so the picture of the whole is the sum of the pieces' pictures.
+"""Part of a light field is a light field, so the image of the whole is the sum of the parts' images.
 
-The oracle is linearity. Tolerance 1e-5 of the brightest pixel: what the design promises; float32 sums in
-another order take about 1e-6.
+The oracle is linearity. Tolerance 1e-5 of the brightest pixel, as the design promises; float32 sums in
+another order need about 1e-6.
 """
 
 from __future__ import annotations

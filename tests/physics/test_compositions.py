@@ -1,7 +1,7 @@
-"""What bit: masks of one plane, rims that cut cells, cameras on their side, elements that do nothing.
+"""Past faults: masks of one plane, rims that cut cells, cameras on their side, elements without effect.
 
-The oracles are laws that hold for any optics (a product of transmissions is one transmission, a turned camera
-takes a turned picture, what absorbs nothing changes nothing) and the brute-force tracer.
+The oracles are laws that hold for any optics (a product of transmissions is one transmission, a rotated camera
+takes a rotated image, an element that absorbs nothing changes nothing) and the brute-force tracer.
 """
 
 from __future__ import annotations

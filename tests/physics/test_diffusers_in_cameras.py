@@ -1,11 +1,12 @@
-"""Diffusers in cameras: light kept, blur by the kernel times the distance, and brute force for all else.
+"""Diffusers in cameras: conserved light, blur by the kernel times the distance, and brute force for all else.
 
 Oracles: conservation; the characteristic function and the moments of kernels in closed form; the tracer of
-`ray_oracle`, backwards and forwards, which draws what diffusers do from NumPy's generator.
+`ray_oracle`, backward and forward, which draws the scattering of diffusers from NumPy's generator.
 
-What limits an agreement with the tracer: the tracer's noise (measured), the picture's own sampling error (its
-estimate), and the light field, which is samples of the scene, interpolated. That last part is measured once, by
-the picture of the camera without diffusers, traced with very many rays: `test_the_light_field_holds_the_scene`.
+Agreement with the tracer is limited by the tracer's noise (measured), the image's own sampling error (its
+estimate), and the light field, which consists of samples of the scene, interpolated. This last error is measured
+once, by the image of the camera without diffusers, traced with very many rays:
+`test_the_light_field_holds_the_scene`.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ PICTURE = vcc.Sensor(z=D, shape=(14, 16), pitch=2.4 * D * SLOPE)
 LENS = vcc.Lens(focal_length=F, diameter=DIAMETER)
 ROUND = Thin(0.0, bend=lens(F), share=disc(DIAMETER))
 LIGHT_FIELD_ERROR = 10 ** (-60 / 20)
-"""Of the light field, as a share of the picture's largest value."""
+"""Error of the light field, as a fraction of the image's largest value."""
 
 
 PLANES = TwoPlanes(VIEWS, SPACING, SLOPE, PIXELS, DISPARITY, FOCUS)

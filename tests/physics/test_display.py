@@ -1,21 +1,21 @@
-"""A light-field display is a camera's transpose: a panel where the sensor is sends light back through the optics.
+"""A light-field display is a camera's transpose: a panel in the place of the sensor emits light through the
+optics.
 
-A pixel of a camera holds the mean of irradiance over its sensitive area A_p,
+A pixel of a camera records the mean irradiance over its sensitive area A_p,
 
     I_p = (1/A_p) Σ_q G_pq L_q,
 
 where G_pq is the étendue (area times slopes, m²) that the pixel shares with the cell of sample q through the
-optics, which keep both étendue and radiance. A panel whose pixels have the radiances P_p fills G_pq of the étendue
-V_q of each cell with radiance P_p, so that it sends out the mean radiance
+optics; both étendue and radiance are conserved. A panel whose pixels have the radiances P_p fills the part G_pq
+of the étendue V_q of each cell with radiance P_p, so that it emits the mean radiance
 
     L_q = (1/V_q) Σ_p G_pq P_p = (A_p/V_q) (Aᵀ P)_q.
 
-So Aᵀ P is in units of radiance times slope squared; times a pixel's area it is the flux that leaves through a cell
-(in units of radiance times m²), and divided by the cell's étendue, the mean radiance there.
+So Aᵀ P is in units of radiance times slope squared. Times a pixel's area it is the flux that leaves through a
+cell (in units of radiance times m²); this flux divided by the cell's étendue is the mean radiance there.
 
-Oracle: a panel at the focal length f of a lens array that stands in the plane of the light field. Light that
-leaves a cell with centre c anywhere has come from x = c + f·s of the panel, the line through the centre, along
-each axis.
+Oracle: a panel at the focal length f of a lens array in the plane of the light field. Light that leaves a cell
+with centre c anywhere has come from x = c + f·s of the panel, the line through the centre, along each axis.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ CAMERA = vcc.Camera(
 
 @cache
 def planned() -> tuple[Plan, vcc.LightField]:
-    """A view for each lenslet: a cell of the light field has light of one alone."""
+    """One view per lenslet: a cell of the light field has light from one lenslet only."""
     shape = (LENSLETS, LENSLETS, SLOPES, SLOPES)
     field = vcc.LightField.from_views(np.zeros(shape, np.float32), PITCH, STEP, np.inf, disparity_range=(0, 0))
     return CAMERA.compile(field, method="rays", samples=RAYS, between_views="none"), field
 
 
 def radiance(panel: np.ndarray) -> np.ndarray:
-    """What the display sends out, (v, u, t, s)."""
+    """The emitted light, (v, u, t, s)."""
     sent = back(*planned(), panel).samples
     return np.asarray(sent, dtype=np.float64) * PIXEL**2 / CELL
 

@@ -1,8 +1,7 @@
-"""Light is neither made nor lost: conservation is the oracle, and L₀·A/d² for uniform radiance.
+"""Light is conserved: conservation is the oracle, and L₀·A/d² for uniform radiance.
 
-Tolerance: pictures are float32, summed here in float64. A pixel is a sum of about a hundred float32
-products, each right to 6e-8, and errors of thousands of pixels average: 1e-6 leaves no room for anything
-but rounding.
+Tolerance: images are float32, summed here in float64. A pixel is a sum of about a hundred float32 products, each
+correct to 6e-8, and errors of thousands of pixels average: 1e-6 only allows for rounding.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Where light meets: focus, thin-lens equation, size of the blur, prism. The oracles are closed forms.
+"""Where rays meet: focus, thin-lens equation, size of the blur, prism. The oracles are closed forms.
 
-A ray that leaves a point at distance Z before the lens meets the plane d behind it at
+A ray that leaves a point at distance Z in front of the lens meets the plane d behind it at
 x = u·(1 − d/f) + d·s, with s = u/Z + const: x = u·(1 − d/d') + const, 1/d' = 1/f − 1/Z.
 """
 

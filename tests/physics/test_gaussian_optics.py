@@ -35,9 +35,9 @@ def prescription(rows=LENS) -> Prescription:
 
 
 def snell(rows, z: float, y: float, angle: float) -> tuple[float, float]:
-    """(height, angle) at the last vertex of a ray in a plane that holds the axis: exact, metres and radians.
+    """(height, angle) of a ray at the last vertex, in a plane with the axis: exact, metres and radians.
 
-    Each surface is met where the ray cuts the circle; there n·sin(angle to the normal) is kept.
+    Each surface is met where the ray cuts the circle; n·sin(angle to the normal) is conserved there.
     """
     vertex, before = 0.0, 1.0
     for radius, thickness, after, _ in rows:
@@ -59,8 +59,9 @@ def snell(rows, z: float, y: float, angle: float) -> tuple[float, float]:
 
 
 SMALL = 1e-6
-"""Slopes of the exact rays. From a source at 2 m they meet the lens h = 2 µm off the axis: what the paraxial limit
-leaves out is of the order of (h/R)² = 1e-8. From 80 mm h is 80 nm, and the rounding of heights (1e-17 m) 1e-10."""
+"""Slopes of the exact rays. From a source at 2 m they meet the lens h = 2 µm off the axis: the error of the
+paraxial limit is of the order of (h/R)² = 1e-8. From 80 mm h is 80 nm, and the rounding of heights (1e-17 m)
+gives 1e-10."""
 
 
 def axis_crossing(rows, object_distance: float) -> float:

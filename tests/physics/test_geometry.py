@@ -1,4 +1,4 @@
-"""Where rays are: the frame of a camera array, disparity, slices, scale and orientation.
+"""Positions of rays: the frame of a camera array, disparity, slices, scale and orientation.
 
 The oracle is projection by hand: a pinhole at u sees the point (X, −Z) along the slope (u − X)/Z.
 """

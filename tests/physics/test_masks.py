@@ -1,8 +1,8 @@
-"""Masks: against the sensor, at the lens and half-way, any number of them, in any order.
+"""Masks: against the sensor, at the lens and in mid-path, any number of them, in any order.
 
-Oracles: the picture without the mask times the mask's pixel means (closed form, which linear interpolation makes);
-equality of two ways to say the same aperture; the brute-force tracer for what is half-way and for what mask and
-light do together within a pixel.
+Oracles: the image without the mask times the mask's pixel means (closed form, which linear interpolation
+computes); equality of two descriptions of the same aperture; the brute-force tracer for masks in mid-path and
+for joint effects of mask and light within a pixel.
 """
 
 from __future__ import annotations
@@ -222,9 +222,9 @@ def test_a_cosine_mask_half_way_matches_brute_force_to_50_dB(scene, light_field,
 
 
 def test_two_masks_at_different_places_converge_to_brute_force_as_views_get_closer(scene):
-    # Each mask is averaged over a cell alone; what two do together inside it (their covariance, DESIGN,
-    # section 4) is second order in the cell: twice as many views a side leave a quarter, 12 dB. Cells of views
-    # divided in two, as they are by default where masks vary together within them, do as well.
+    # Each mask is averaged over a cell separately; the joint effect of two masks inside it (their covariance) is
+    # second order in the cell: twice as many views per side leave a quarter, 12 dB. So do cells of views divided
+    # in two, the default if masks vary together within them.
     masks = [(0.4 * D, 7 * mm), (0.7 * D, 5 * mm)]
     elements = [vcc.Mask(z=z, pattern=CosineSum((p, p), 1, 0.7)) for z, p in masks]
     sensor = replace(PICTURE, shape=(32, 32))

@@ -1,8 +1,8 @@
-"""A camera that asks for rays which the light field does not hold gets its picture, and is told the share.
+"""If a camera needs rays that the light field does not have, the image is made and their share is reported.
 
-Oracles: areas in closed form, and rays drawn here. The share is an estimate from 2^16 evenly spread rays. `EVEN`
-is more than such a set errs by beside a border, which some 4·2^12 of its boxes of 2^-4 a side meet, each wrong by
-half a ray at random: 2^7/2^17, and what the rays drawn here err by.
+Oracles: areas in closed form, and rays drawn here. The share is an estimate from 2^16 quasi-random rays. `EVEN`
+is more than the error of such a set at a border: the border crosses some 4·2^12 of its boxes with sides of 2^-4,
+each wrong by half a ray at random: 2^7/2^17; plus the error of the rays drawn here.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""What does nothing changes nothing: neither the picture nor the way in which it is made.
+"""Elements without effect change nothing: neither the image nor the method.
 
-Oracle: the same camera without it, or with the prism or lens that it is.
+Oracle: the same camera without the element, or with the equivalent prism or lens.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""What the paper says (Zhou, *Virtual Computational Camera*, 2009), next to what we do.
+"""The paper (Zhou, *Virtual Computational Camera*, 2009) compared with this package.
 
-Its matrices are typed in here from the paper; its step-by-step pipeline is written out with
-`scipy.ndimage`, in flatland (one row of views, one row of pixels) where grids can be made very fine, and
-once more in four dimensions with the light field's own operators.
+Its matrices are copied here from the paper. Its step-by-step pipeline is written out with `scipy.ndimage`, in
+flatland (one row of views, one row of pixels), where grids can be very fine, and once more in four dimensions
+with the light field's own operators.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Phase plates against closed forms: spot diagrams, foci, aberrations, and the lenses and prisms that some are."""
+"""Phase plates against closed forms: spot diagrams, foci, aberrations, and equivalent lenses and prisms."""
 
 from __future__ import annotations
 

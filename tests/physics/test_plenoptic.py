@@ -1,13 +1,13 @@
-"""Plenoptic cameras: where micro-images lie, when they touch, what light they hold, and brute force for the rest.
+"""Plenoptic cameras: positions of micro-images, when they touch, their light, and brute force for the rest.
 
-Oracles: closed forms for a square aperture; the tracer of `ray_oracle`, which finds the lenslet of a place by
-trying those that stand near.
+Oracles: closed forms for a square aperture; the tracer of `ray_oracle`, which finds the lenslet at a place by
+testing those nearby.
 
-An array of pitch p at d behind the main lens, the sensor b behind the array. A sensor point x and a lenslet
-centred at c see the place c + (c − x)·d/b of the main lens, for every place on the lenslet where 1/f = 1/b + 1/d
-(the lenslets then image the aperture sharply). So the aperture's image is w = a·b/d wide around c·(1 + b/d), each
-lenslet fills p²/b² of solid angle, and the irradiance of a white scene is p²/b² times the number of micro-images
-that cover a point.
+An array of pitch p at d behind the main lens, the sensor b behind the array. From a sensor point x, a lenslet
+centred at c shows the place c + (c − x)·d/b of the main lens, for every place on the lenslet if 1/f = 1/b + 1/d
+(the lenslets then image the aperture sharply). So the aperture's image is w = a·b/d wide around c·(1 + b/d),
+each lenslet fills p²/b² of solid angle, and the irradiance of a white scene is p²/b² times the number of
+micro-images that cover a point.
 """
 
 from __future__ import annotations

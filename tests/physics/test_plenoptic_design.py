@@ -1,4 +1,4 @@
-"""A plenoptic camera from its lenslets: f-numbers match, micro-images touch, its recordings decode to views."""
+"""A plenoptic camera designed from its lenslets: f-numbers match, micro-images touch, views can be decoded."""
 
 import math
 import warnings

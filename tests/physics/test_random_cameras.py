@@ -1,6 +1,6 @@
-"""Random cameras of all kinds: laws that hold for all of them, and brute force. A part of the battery.
+"""Random cameras of all kinds: laws that hold for all of them, and brute force, for a part of all cases.
 
-In full it is `python benchmarks/physical_laws.py`, which also reproduces a single camera by its kind and seed.
+`python benchmarks/physical_laws.py` runs all of them; it also reproduces a single camera by its kind and seed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tests.physics.random_tracer import Bench, Plane, Scene, Table
 from vcc.base.units import mm
 
 SLOW = {"stores", "refine"}
-"""Laws that take half a second a camera, or more."""
+"""Laws that take half a second per camera, or more."""
 
 
 def held(found: list[Check]) -> None:

@@ -1,7 +1,7 @@
-"""Pictures made by rays: plates, biprisms, how large the sampling error is, and light fields of every form.
+"""Images by rays: plates, biprisms, the size of the sampling error, and light fields of every form.
 
-Oracles: prisms and lenses, which fold into matrices; the tracer of `ray_oracle`; closed forms of where a biprism
-shows a point; pictures of very many rays, for the error of few.
+Oracles: prisms and lenses, which fold into matrices; the tracer of `ray_oracle`; closed forms for the image of a
+point through a biprism; images with very many rays, for the error with few.
 """
 
 from __future__ import annotations

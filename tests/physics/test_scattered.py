@@ -1,7 +1,7 @@
 """The light field behind a diffuser: `lf.scattered`, the paper's convolution ⊗ (section 3.2.2).
 
-Oracles: conservation; the sum over deflections of prisms, which is what a kernel says; Gaussians, which scatter
-to Gaussians in closed form.
+Oracles: conservation; the sum over deflections of prisms, which is the definition of a kernel; Gaussians, which
+scatter to Gaussians in closed form.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The sampling error that an image by rays reports, against its true one, and the warning that follows from it.
+"""The sampling error that an image by rays reports, against its true one, and the resulting warning.
 
-The oracle is brute force: the mean of images of 16 384 rays a pixel and other seeds, whose own error is known from
-their scatter, and is less than a fifth of all that are compared with it.
+The oracle is brute force: the mean of images of 16 384 rays per pixel and other seeds. Its own error is known
+from their scatter, and is less than a fifth of all errors that are compared with it.
 """
 
 from __future__ import annotations

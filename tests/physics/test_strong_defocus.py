@@ -1,8 +1,7 @@
-"""Strong defocus: views far apart on the sensor show no ghosts, and what is in focus stays sharp.
+"""Strong defocus: views far apart on the sensor show no ghosts, and objects in focus stay sharp.
 
-Oracles: the blur disc of a point is a uniform disc of known height, and a cosine's transfer
-through a disc is 2·J₁(x)/x. With
-``between_views="none"`` the same scenes show the ghosts: the tests can fail.
+Oracles: the blur disc of a point is a uniform disc of known height, and the transfer of a cosine through a disc
+is 2·J₁(x)/x. With ``between_views="none"`` the same scenes show ghosts: the tests can fail.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 """Textured planes, one and two that overlap, against the integral of the closed-form texture.
 
-The oracle is `brute_force`: the scene's formula integrated over the round stop. 20 × 20 views 1 mm apart
-see planes whose pictures move by up to one pixel a view; the stop is 16 mm wide and cuts through cells.
+The oracle is `brute_force`: the scene's formula integrated over the round stop. 20 × 20 views 1 mm apart see
+planes whose images move by up to one pixel per view; the stop is 16 mm wide and cuts through cells.
 
-Where the 60 dB come from, for linear interpolation: a sample is spread by a tent of one step, whose
-transfer at ν cycles a sample is sinc²(ν) ≈ 1 − (πν)²/3. The textures hold cosines of amplitude 0.1 and
-periods of 26, 34, 47 and 70 samples, so the loss has an RMS of 0.1/√2 · √Σ((π/p)²/3)² = 4.1e-4 against
-a peak of at most 0.9: 66 dB and no better. What the sum over views leaves (midpoint rule, gap g pixels:
-transfer sinc(g·ν), 0.0024 of the finest at one pixel) is below that. Cubic spares the tent's loss.
+Why 60 dB, for linear interpolation: a sample is spread by a tent of one step, whose transfer at ν cycles per
+sample is sinc²(ν) ≈ 1 − (πν)²/3. The textures have cosines of amplitude 0.1 and periods of 26, 34, 47 and 70
+samples, so the loss has an RMS of 0.1/√2 · √Σ((π/p)²/3)² = 4.1e-4 against a peak of at most 0.9: 66 dB and no
+better. The error of the sum over views (midpoint rule, gap g pixels: transfer sinc(g·ν), 0.0024 of the finest at
+one pixel) is below that. Cubic interpolation avoids the tent's loss.
 """
 
 from __future__ import annotations

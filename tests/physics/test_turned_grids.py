@@ -1,7 +1,7 @@
-"""Grids of views that are turned or sheared, and rims that are not in their plane.
+"""Grids of views that are rotated or sheared, and rims outside their plane.
 
-Oracles: areas in closed form, and integrals over the stop. A stop inside the grid lets in light in proportion to
-its area, however the grid lies: cells of views cover the plane once.
+Oracles: areas in closed form, and integrals over the stop. A stop inside the grid transmits light in proportion
+to its area, whatever the orientation of the grid: cells of views cover the plane once.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A user's own element: a spiral phase plate with an absorbing middle and rim, in every engine and explained.
+"""A user-defined element: a spiral phase plate with an absorbing middle and rim, in every engine and explained.
 
-Oracles: the tracer of `ray_oracle`, which has the plate's formulas once more; the closed form of the ring that the
-plate makes of a point; elements of the package that a user's element can be written to equal.
+Oracles: the tracer of `ray_oracle`, with its own copy of the plate's formulas; the closed form of the ring that
+the plate makes of a point; elements of the package that a user-defined element can reproduce.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Views made in between by depth: a scene far out of focus as a whole or in part shows no ghosts.
+"""Views interpolated by depth: a scene far out of focus, as a whole or in part, shows no ghosts.
 
-The oracle is `brute_force`: a closed-form half plane with a sharp border before another plane, integrated over
-the round stop; samples are means over pixels, as of cameras. Views see planes that move by up to 4 pixels from one
-to the next. Disparities are those of the closed form, so that what is left is what looking from in between costs.
+The oracle is `brute_force`: a closed-form half plane with a sharp border in front of another plane, integrated
+over the round stop; samples are means over pixels, as of cameras. Views see planes that move by up to 4 pixels
+from one view to the next. Disparities are those of the closed form, so that the remaining error is that of
+interpolation.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A scene for pictures by rays, and its light field: a textured plane before another, its edge soft."""
+"""A scene for images by rays, and its light field: a textured plane in front of another, its edge soft."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans of cameras that differ in a mask's cells: the same as each camera's own. The oracle is `compile_best`."""
+"""Plans of cameras that differ in a mask's cells equal each camera's own plan. The oracle is `compile_best`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How much of a mask's detail averaging takes away."""
+"""How much detail of a mask is lost by averaging."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When a diffuser is a blur of the picture, when of each view, and when rays are needed."""
+"""When a diffuser is computed as a blur of the image, as a blur of each view, or by rays."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vcc.plan.operators import Blur, BlurViews
 from vcc.shapes import kernels, surfaces
 from vcc.shapes.patterns import CosineSum, Open
 
-pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # cameras here ask for what they like
+pytestmark = pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning")  # any camera may be requested here
 
 D = 1 / (1 / 50e-3 - 1)
 SENSOR = vcc.Sensor(D, (12, 14), D * 4e-3)

@@ -1,5 +1,5 @@
-"""How finely cells of views and samples are divided for errors that are told; what of a plan has to hold while
-its numbers follow a camera."""
+"""How finely cells of views and samples are subdivided for the reported errors, and what must stay fixed in a plan
+whose parameters follow a camera."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def between(down=0.0, across=0.0, motion=STILL):
 
 @dataclass
 class Told(Detail):
-    """Detail that is told beforehand; what was asked is kept."""
+    """Reported detail; the arguments are recorded."""
 
     loses: object = 0.0
     apart: Apart | None = None

@@ -1,8 +1,8 @@
-"""Plans that are computed by choices made once: for a camera a little different, they have the same numbers by
-name, and these follow the camera's parameters smoothly.
+"""Plans computed with fixed choices: for a slightly different camera, they have parameters with the same names,
+and these follow the camera's parameters smoothly.
 
-The oracle is the calculus of differences: of a smooth function, central differences by steps that differ ten
-times agree to the square of the steps.
+The oracle is the calculus of differences: for a smooth function, central differences with steps that differ by a
+factor of ten agree to the square of the steps.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from vcc.shapes.stacked_patterns import Product, Shifted
 from vcc.units import mm, um
 
 STEPS = (3e-6, 3e-5, 3e-4)
-"""Two decades of steps, as shares of what `scale` gives."""
+"""Two decades of steps, as fractions of `scale`."""
 LEFT_OUT = ("electronics", "source", "matrix", "stop_from_entrance", "fill_factor")
 
 
 def leaves(thing: Any, path: tuple = ()):
-    """(path, value) of all numbers of a dataclass that are of floating point."""
+    """(path, value) of all floating-point fields of a dataclass."""
     if isinstance(thing, float) and np.isfinite(thing):
         yield path, thing
     elif isinstance(thing, tuple):
@@ -45,7 +45,7 @@ def leaves(thing: Any, path: tuple = ()):
 
 
 def put(thing: Any, path: tuple, value: float) -> Any:
-    """The same with one number changed."""
+    """The same with one field changed."""
     if not path:
         return value
     head, *rest = path
@@ -64,7 +64,7 @@ def moved(camera: vcc.Camera, number: int, path: tuple, value: float) -> vcc.Cam
 
 
 def scale(camera: vcc.Camera, number: int, path: tuple, value: float) -> float:
-    """How far a parameter goes for the picture to change wholly."""
+    """The change of a parameter that changes the image completely."""
     name = [step for step in path if isinstance(step, str)][-1]
     if name in ("z", "length"):
         return 1 * mm
@@ -78,7 +78,7 @@ def scale(camera: vcc.Camera, number: int, path: tuple, value: float) -> float:
 
 
 def slopes(camera, grid, by, number, path, value):
-    """Central differences of all numbers for each step, times the scale; what refuses, where it does."""
+    """Central differences of all fields for each step, times the scale; errors of refused plans in their place."""
     unit, found = scale(camera, number, path, value), []
     for step in STEPS:
         try:
@@ -95,12 +95,12 @@ def slopes(camera, grid, by, number, path, value):
 
 
 def _finite(values):
-    """What is without bounds stays so, and does not change."""
+    """Infinite values stay infinite, and do not change."""
     return np.where(np.isfinite(values), values, 0.0)
 
 
 EXPECTED = ("the order of the elements", "stand", "at the views", "views apart", "is round", "footprints or rays")
-"""Why an element that touches another, the entrance plane or the sensor cannot move along the axis."""
+"""Why an element that touches another element, the entrance plane or the sensor cannot move along the axis."""
 FOOTPRINTS = [("prisms", 3), ("one mask", 3), ("two masks", 4), ("blur", 2)]
 RAYS = [("facets", 3), ("plate", 0), ("lenslets", 0), ("prism array", 1), ("coded diffuser", 2)]
 

@@ -1,4 +1,4 @@
-"""Shares of samples on pixels: they integrate the footprint, and they sum to one both ways."""
+"""Shares of samples on pixels: they integrate the footprint, and sum to one along both axes."""
 
 import tracemalloc
 

@@ -1,4 +1,4 @@
-"""Where views count as they are: where a camera's own picture of the near thing says that nothing else is seen."""
+"""Views are not blurred where the camera's own image of the near object shows that only it is seen."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from vcc.units import mm
 
 PIXELS, SPACING, SLOPE = (60, 80), 5 * mm, 1e-3
 FOCAL_LENGTH, FAR, NEAR = 50 * mm, 4.0, 4.0 / 3.0
-"""Pictures of what is near move by 2.5 pixels from view to view, those of what is far not at all."""
+"""Images of near points move by 2.5 pixels from view to view, those of far points not at all."""
 
 
 def light_field(views: int = 5) -> tuple[vcc.LightField, vcc.LightField]:
-    """A near rectangle, left of the middle and above it, before something far; and where it is alone."""
+    """A near rectangle, left of the middle and above it, in front of a far plane; and where it is alone."""
     moves = SPACING / SLOPE * (1 / NEAR - 1 / FAR)
     row, column = np.mgrid[: PIXELS[0], : PIXELS[1]]
     disparity = np.zeros((views, views, *PIXELS), np.float32)

@@ -1,5 +1,6 @@
-"""What numbers of plans say of the cells of masks, of plates and of diffusers: transposes against the plans made
-again with a little more of each; and the masks at the views and against the sensor against sums over fine points.
+"""Derivatives of plans' parameters to the cells of masks, plates and diffusers: transposes against plans
+recomputed with a small change of each cell; and masks at the views and against the sensor against sums over fine
+points.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ CASES = {
 
 
 def holders(camera):
-    """All that may hold what numbers are linear in: (thing, field, how to make the camera with another value)."""
+    """All holders of linear parameters: (object, field, how to make the camera with another value)."""
     for n, element in enumerate(camera.elements):
 
         def put(other, n=n):
@@ -121,7 +122,7 @@ def holders(camera):
 
 @pytest.mark.parametrize("name", CASES)
 def test_numbers_that_are_linear_in_what_elements_hold_say_so_by_their_transposes(name):
-    """⟨w, d(numbers)⟩ = ⟨back(w), d(what is held)⟩, the left side by central differences of plans made again."""
+    """⟨w, d(parameters)⟩ = ⟨back(w), d(values)⟩, the left side by central differences of recomputed plans."""
     elements, options = CASES[name]
     camera, how = vcc.Camera(elements, SENSOR), How(**options)
     choices = decide(camera, FIELD.grid, how)
@@ -165,7 +166,7 @@ def test_numbers_that_are_linear_in_what_elements_hold_say_so_by_their_transpose
 
 
 def plane(pattern, step, decentre=(0.0, 0.0)):
-    """A plane that tells views apart only, `step` metres from one to the next."""
+    """A plane on which only views differ, `step` metres from one to the next."""
     at_index = np.hstack([step, np.zeros((2, 2))])
     return Plane(pattern, "mask", decentre, at_index, np.array([-2.1 * mm, -1.4 * mm]))
 
@@ -185,7 +186,7 @@ def taps(finer=1):
 @pytest.mark.parametrize("step", [STRAIGHT, TURNED])
 @pytest.mark.parametrize("number", [1, 2])
 def test_the_open_part_of_a_views_cell_by_many_points(number, step, finer):
-    """The mean of the product over each cell, and the middle of the light in it, by 120² points a cell."""
+    """The mean of the product over each cell, and the centroid of its light, by 120² points per cell."""
     planes = [plane(pattern, step) for pattern in PATTERNS[:number]]
     found = taps(finer)
     aperture = Aperture(planes, found, np.zeros((2, 2)), (8, 9))
@@ -251,9 +252,9 @@ def test_what_is_open_of_cells_says_of_a_masks_cells_what_it_follows_from(number
 
 @pytest.mark.parametrize("fill", [1.0, 0.25])
 def test_a_mask_that_varies_within_pixels_weighs_the_light_there(fill):
-    """Light that is a polynomial of the second degree, a mask of cells a quarter of the sensitive width.
+    """Light that is a quadratic polynomial, a mask with cells a quarter of the sensitive width.
 
-    Where the mask is even, light is its mean: everything is known in closed form, and the filter is exact.
+    Where the mask is constant, the light is its mean: the result has a closed form, and the filter is exact.
     """
     side, n = math.sqrt(fill), 4
     sensor = vcc.Sensor(0.0, (5, 6), (0.3 * mm, 0.2 * mm), fill_factor=fill, decentre=(0.04 * mm, -0.03 * mm))

@@ -1,4 +1,4 @@
-"""Textures of masks: how much looking them up between their points loses, in closed form, and who is told."""
+"""Textures of masks: the error of interpolating between their points, in closed form, and its warnings."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ from vcc.shapes import patterns
 
 @pytest.mark.parametrize("points", [24, 40, 100])
 def test_the_error_of_a_cosine_between_points(points):
-    """Of p points a period, ½·cos θ has third differences of (2 sin(π/p))³/2; of a third derivative d, splines err
-    by d·f(¼ − f²)/6 at f beside a point, d/√30240 root mean square. The largest value is 1."""
+    """For p points per period, ½·cos θ has third differences of (2 sin(π/p))³/2. For a third derivative d,
+    splines err by d·f(¼ − f²)/6 at distance f from a point, d/√30240 root mean square. The largest value is
+    1."""
     texture = 0.5 + 0.5 * np.cos(2 * np.pi * np.arange(20 * points + 1) / points)
     expected = (2 * math.sin(math.pi / points)) ** 3 / 2 / math.sqrt(2) / math.sqrt(30240)
     found = texture_error(np.repeat(texture[None], 9, axis=0).astype(np.float32))
@@ -29,10 +30,10 @@ def test_the_error_of_a_cosine_between_points(points):
 
 @pytest.mark.parametrize("points", [24, 9, 5])
 def test_what_is_looked_up_errs_by_what_is_told_of_it(points):
-    """A cosine whose means over samples are known, looked up at random places.
+    """A cosine with known means over samples, looked up at random places.
 
-    Splines that give back a cosine of ν = 1/p cycles a point add images of (ν/(ν + m))³ of it, for all whole
-    m ≠ 0; told is the leading term of that, (2πν)³/√30240: 97 % of it, 88 % and 70 %.
+    Splines that reproduce a cosine of ν = 1/p cycles per point add images of it with factors (ν/(ν + m))³, for
+    all integers m ≠ 0. The plan reports the leading term, (2πν)³/√30240: 97 % of the error, 88 % and 70 %.
     """
     images = np.arange(-50, 51)[np.arange(-50, 51) != 0] + 1 / points
     told = (2 * np.pi) ** 3 / math.sqrt(30240) / math.sqrt((images**-6.0).sum())

@@ -1,7 +1,7 @@
 """Means of patterns are linear in the values of their cells; `mean_back` is the transpose of that map.
 
-Oracle: the means themselves, ⟨w, mean(values + change) − mean(values)⟩ = ⟨mean_back(w), change⟩, exact since the
-map is linear.
+Oracle: the means themselves, ⟨w, mean(values + change) − mean(values)⟩ = ⟨mean_back(w), change⟩, exact because
+the map is linear.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Masks in one plane: how they are listed makes no difference to the numbers of a plan."""
+"""Masks in one plane: the order in which they are listed does not change the plan."""
 
 from __future__ import annotations
 

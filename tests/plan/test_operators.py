@@ -31,11 +31,11 @@ from vcc.plan.operators import (
 from vcc.plan.parameters import parameters, with_parameters
 
 SEEDS = range(6)
-"""Shapes and numbers follow from it."""
+"""Determines shapes and numbers."""
 
 ROUNDING = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-7}
-"""Of ‖A x‖·‖y‖. A sum of n products rounds to n·ε of it at most: n is below 10⁴ here, and ε is 1.1e-16 in double
-precision. What is computed so and kept in single precision is rounded once more, each number to 6e-8 of itself."""
+"""Fraction of ‖A x‖·‖y‖. A sum of n products rounds to at most n·ε of it: n is below 10⁴ here, and ε is 1.1e-16 in
+double precision. Results stored in single precision are rounded once more, each number to 6e-8 of itself."""
 
 
 def odd(rng: np.random.Generator, most: int = 9) -> int:
@@ -47,7 +47,7 @@ def signed(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def sharpening(rng: np.random.Generator) -> tuple[int, int, int]:
-    """Whole numbers of 2⁻¹⁰ that keep what is even."""
+    """Integer weights in 2⁻¹⁰ that preserve constants."""
     near, far = -int(rng.integers(50, 300)), int(rng.integers(0, 60))
     return 1024 - 2 * (near + far), near, far
 
@@ -94,7 +94,7 @@ def drawn_raster(rng: np.random.Generator, least: int = 1) -> np.ndarray:
 
 
 def on_sensor(rng: np.random.Generator, kind: str) -> tuple[OnSensor, np.ndarray]:
-    """An operator, and a raster that it takes."""
+    """An operator, and a raster for it."""
     guard, with_transmission, with_detail = ON_SENSOR[kind]
     raster = drawn_raster(rng, 2 * guard + 1)
     shape = raster.shape[0] - 2 * guard, raster.shape[1] - 2 * guard

@@ -1,4 +1,4 @@
-"""What the plan decides between views, and that it decides the same wherever the light field is given."""
+"""The plan's choice between views, which does not depend on the plane in which the light field is given."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def light_field(disparity_range) -> vcc.LightField:
 @pytest.mark.parametrize("z", [45 * mm, 52 * mm, 120 * mm])
 @pytest.mark.parametrize("disparity_range", [(-1.0, 1.0), (-2.5, -0.6), (0.3, 4.0)])
 def test_a_field_taken_to_the_sensor_is_summed_as_the_camera_does(z, disparity_range):
-    """The same rays given behind the lens, where the scene's images lie on both sides of infinity."""
+    """The same rays in a plane behind the lens, where the scene's images lie on both sides of infinity."""
     field = light_field(disparity_range)
     sensor = vcc.Sensor(z=z, shape=(24, 24), pitch=0.01 * z)
     camera = vcc.Camera([vcc.Lens(50 * mm)], sensor)

@@ -1,6 +1,6 @@
-"""Cores of plans and their parts: what blocks of a light field add up to, and which samples a core looks at.
+"""Cores of plans and their parts: sums over blocks of a light field, and the samples that a core reads.
 
-Oracle: the reference engine on the whole, and its transpose, which says what every sample weighs.
+Oracle: the reference engine on the whole, and its transpose, which gives the weight of every sample.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ STEPS = {
 
 
 def core_of(step: np.ndarray, interpolation="linear", refine=1, **changed) -> Footprints:
-    """A core with taps between views, some dark, and a mask; samples fall on the raster and beside it."""
+    """A core with taps between views, some dark, and a mask; samples fall inside and outside the raster."""
     taps = 4, 5
     weights = RANDOM.uniform(0.2, 1, taps)
     weights[1] = weights[:, 2] = 0

@@ -1,5 +1,5 @@
-"""The geometry that plans decide by: cells of views and samples on planes and on the sensor, what lies between
-views, which light is missing. Oracles are corners listed one by one, closed forms and many random places."""
+"""The geometry behind plans' choices: cells of views and samples on planes and on the sensor, the space between
+views, missing light. Oracles are corners listed one by one, closed forms and many random places."""
 
 from __future__ import annotations
 

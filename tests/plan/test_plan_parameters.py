@@ -1,4 +1,4 @@
-"""The numbers of plans by name, choices compared, and costly parts that are kept."""
+"""The parameters of plans by name, comparison of choices, and cached parts of plans."""
 
 from dataclasses import dataclass, replace
 

@@ -1,5 +1,5 @@
 """Rules by which plans are made, each against a closed form or a few lines of brute force: views in between,
-slopes of shares, diffusers as blurs, textures of rays and the table of points."""
+derivatives of shares, diffusers as blurs, textures of rays and the table of points."""
 
 from __future__ import annotations
 

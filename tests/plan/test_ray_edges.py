@@ -1,4 +1,4 @@
-"""Which hard edges rays run into, and against which of them a change of numbers moves rays."""
+"""Which hard edges rays meet, and which changes of parameters move rays across them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Steps of rays at single places, against what the elements' own definitions say there."""
+"""Steps of rays at single places, against the elements' own definitions there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def bundle(x: np.ndarray, y: np.ndarray) -> steps.Bundle:
 
 
 def middles(rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(x, y) of the middles of cells of a square lattice, (rows, columns)."""
+    """(x, y) of the centres of cells of a square lattice, (rows, columns)."""
     y, x = np.meshgrid(rows * PITCH + DECENTRE[1], columns * PITCH + DECENTRE[0], indexing="ij")
     return x, y
 

@@ -1,6 +1,6 @@
-"""Functions of position as textures: as coarse as a picture allows, and no coarser.
+"""Functions of position as textures: as coarse as an image allows, and no coarser.
 
-Oracles: the same mask as uniform cells, which rays meet with sharp edges; and path maps of functions of known
+Oracles: the same mask as uniform cells, which has sharp edges for rays; and path maps of functions with a known
 gradient.
 """
 

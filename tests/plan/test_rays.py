@@ -1,4 +1,4 @@
-"""Where rays are aimed, how far they stray, and what is made of functions of position."""
+"""Where rays are aimed, how far they stray, and how functions of position are sampled."""
 
 from __future__ import annotations
 

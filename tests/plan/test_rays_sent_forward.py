@@ -1,5 +1,5 @@
-"""Rays that a plan traces back from the sensor, sent forward again through what the elements are: they come to the
-pixel that they were traced from, and weigh what the elements' own patterns let pass."""
+"""Rays that a plan traces back from the sensor, traced forward through the elements' definitions: they reach the
+pixel from which they were traced, and have the weight that the elements' own patterns give them."""
 
 from __future__ import annotations
 
@@ -96,11 +96,11 @@ LIT = {
     "masks": 1.0, "cells off the middle of their sheet": 0.995, "in one plane": 0.94, "facets": 0.42,
     "prisms": 0.23, "lenslets": 0.095, "round lenslets": 0.19, "plate": 0.99, "thick lens": 1.0, "turned": 0.96,
 }  # fmt: skip
-"""At least this share of the rays passes all that they are aimed through: aims are no wider than that."""
+"""Least share of the rays that passes everything they are aimed through: aims are no wider than that."""
 
 
 def sent_forward(camera, rays, places=None):
-    """Rays (n, 4) of the entrance plane on the sensor, and what of each the elements let pass."""
+    """Positions on the sensor of rays (n, 4) from the entrance plane, and the share that the elements transmit."""
     passed = np.ones(len(rays))
     places = [] if places is None else places
     for stage in camera.stages:

@@ -1,4 +1,4 @@
-"""Filters that give sharpness back, by their gains: closed forms of what was lost."""
+"""Filters that restore sharpness: their gains against closed forms of the loss."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from vcc.plan.sharpening import MEAN, TENT, across_plane, along_axis, gain
 
 FREQUENCIES = np.linspace(0.0, 0.5, 51)
-"""Cycles a pixel."""
+"""Cycles per pixel."""
 
 
 def gain_of(weights: np.ndarray, frequency: np.ndarray) -> np.ndarray:

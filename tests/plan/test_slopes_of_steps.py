@@ -1,4 +1,4 @@
-"""Steps of rays and aims gone through backwards: their transposes against difference quotients of what they do."""
+"""The backward pass of steps of rays and aims: transposes against difference quotients of the forward pass."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ from vcc.shapes.lattice import Lattice
 RANDOM = np.random.default_rng(11)
 RAYS = ("x", "y", "s", "t", "share", "points")
 STEP = 1e-7
-"""Of numbers about 1: rounding leaves some 1e-8 of a difference quotient; curvature as much, but for rays beside
-the rim of a disc, which leave 1e-5 of what all say. None of some hundred rays comes upon a kink within it."""
+"""For numbers of about 1: rounding gives some 1e-8 of a difference quotient, and curvature as much, except for
+rays at the rim of a disc, which give 1e-5 of the whole sum. None of some hundred rays meets a kink within the
+step."""
 TOLERANCE = {"rel": 3e-5, "abs": 1e-6}
 
 

@@ -1,4 +1,4 @@
-"""A picture follows the place of a mask, and a lens before it, smoothly: slopes do not depend on the step."""
+"""An image follows the position of a mask, and of a lens in front of it, smoothly, whatever the step."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SPACING = np.diag(met(camera({}))[:, 2:4]) / np.diag(PLAN.core.masks[0].step)
 
 
 def places(changed: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Where sample (0, 0) of each view meets the first camera's texture, (column, row) in points, and steps."""
+    """Position of sample (0, 0) of each view on the first camera's texture, (column, row) in points, and steps."""
     lookup, moved = PLAN.core.masks[0], met(camera(changed)) - met(camera({}))
     views = np.stack(np.meshgrid(np.arange(5.0), np.arange(5.0)), axis=-1)
     start = np.stack([lookup.column, lookup.row], axis=-1) + (views @ moved[:, :2].T + moved[:, 4]) / SPACING
@@ -43,7 +43,7 @@ def places(changed: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def picture(changed: dict[str, float], shift: np.ndarray) -> np.ndarray:
-    """What a changed camera makes by the texture of the first, shifted by so many points."""
+    """The image of a changed camera with the texture of the first, shifted by a number of points."""
     start, step = places(changed)
     own = camera(changed).compile(FIELD, method="footprints", between_views="none", refine=1).core
     numbers = {"x": own.x, "y": own.y, "step": own.step, "masks[0].step": step}

@@ -61,7 +61,7 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     run = Drive(plan, samples, how)
     room = explain_rays if plan.by_rays else explain_footprints
     parts, seconds = room.sections(run)
-    made = "How the picture is made\n" + "\n".join(f"  {note}" for note in plan.notes)
+    made = "How the picture is made\n" + "\n".join(f"  {note}" for note in (*plan.notes, *_by_direction(train)))
     limits = _limits(train, samples.grid, how.scene_distance)
     text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
     if samples.whole() is None:
@@ -101,6 +101,21 @@ def _what(train: Train, grid: Grid) -> str:
         f"{grid.kind} {SAMPLES_IN_WORDS[grid.sample]}; {grid.geometry}"
     ]
     return "\n".join([*lines, *train.listed()])
+
+
+def _by_direction(train: Train) -> list[str]:
+    """What depends on the direction of light, and how photodiodes share it."""
+    notes = []
+    labels = dict.fromkeys(stage.element.label for stage in train.stages if stage.term is not None)
+    if labels:
+        notes.append(f"transmission that depends on direction: {', '.join(labels)}")
+    rows, columns = train.sensor.photodiodes
+    if rows * columns > 1:
+        notes.append(
+            f"this is the plan of whole pixels; a capture makes an image for each of their {rows}×{columns} photodiodes, "
+            f"whose microlenses image {train.chief_rays().of} onto them"
+        )
+    return notes
 
 
 def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:

@@ -14,6 +14,7 @@ from vcc.advice.words import SamplingItem
 from vcc.base.errors import InputError
 from vcc.optics.train import Stage
 from vcc.plan.parallax_rule import index_motions
+from vcc.shapes.directional import AngularFringes, Gaps
 from vcc.shapes.lattice import CellApertures
 from vcc.shapes.patterns import Bounded, Cells, CosineSum, FunctionPattern, Pattern
 
@@ -44,6 +45,10 @@ def finest_detail(pattern: Pattern) -> float | None:
             return None if math.isinf(period) else float(period / pattern.harmonics / 2)
         case CellApertures():
             return float(pattern.scale * pattern.lattice.pitch)
+        case AngularFringes():
+            return None if pattern.frequency == 0 else math.pi / abs(pattern.frequency)
+        case Gaps():
+            return float(pattern.width)
         case FunctionPattern():
             raise InputError("how fine a function of position is cannot be known")
     return None
@@ -67,6 +72,8 @@ def mask_limits(optics: Folded, stage: Stage, wavelength: float) -> tuple[Items,
     if detail is None:
         return {}, ()
     mask = _Mask(optics, stage, detail)
+    if stage.term is not None:  # not a mask at a place: it casts no shadow there, and its detail may be of slopes
+        return (mask.cells() if stage in optics.reached else {}), ()
     if stage not in optics.reached:
         return mask.fresnel(wavelength), (words.footprints_unknown(label),)
     if mask.in_aperture:
@@ -90,7 +97,9 @@ class _Mask:
 
     @property
     def label(self) -> str:
-        return self.stage.element.label
+        term = self.stage.term
+        of_slopes = term is not None and not np.asarray(term.of)[:, :2].any()
+        return self.stage.element.label + (" (1 m for a slope of 1)" if of_slopes else "")
 
     @property
     def place(self) -> Array:

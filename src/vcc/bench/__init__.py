@@ -1,1 +1,1 @@
-"""The optical bench: a camera on its axis beside the picture that it makes, both moving together."""
+"""The optical bench: an interactive side view of a camera next to the image it makes, updated together."""

@@ -1,4 +1,4 @@
-"""What can be put on a bench: kinds of elements with their parameters in words, and new ones that fit."""
+"""Elements that can be added to a bench: kinds with their parameters as text, and suitable new ones."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from vcc.optics.train import Train
 Json = dict[str, Any]
 
 DEEPEST = 3
-"""How far parts inside parts are listed: a pattern's pattern's lattice."""
+"""Depth to which nested parts are listed: a pattern's pattern's lattice."""
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
@@ -44,7 +44,7 @@ def kinds() -> list[Json]:
 
 
 def sensor_parameters() -> list[Json]:
-    """The parameters of a sensor, likewise."""
+    """The parameters of a sensor."""
     return _parameters(Sensor, DEEPEST)
 
 
@@ -104,7 +104,7 @@ def _parameter(name: str, field: Field[Any], hint: Any, words: str, depth: int) 
 
 
 def _takes(choices: tuple[Any, ...], depth: int) -> list[str]:
-    """What may be written: "number", "whole number", "text", "truth", "list", "array", "name", "table"."""
+    """The accepted forms: "number", "whole number", "text", "truth", "list", "array", "name", "table"."""
     names = {float: "number", int: "whole number", str: "text", bool: "truth"}
     found = [names[choice] for choice in choices if choice in names]
     if any(get_origin(choice) is tuple for choice in choices):
@@ -119,7 +119,7 @@ def _takes(choices: tuple[Any, ...], depth: int) -> list[str]:
 
 
 def _default(field: Field[Any]) -> Any:
-    """A parameter's default as a camera file has it; None for none, and for what only Python can hold."""
+    """A parameter's default as in a camera file; None without one, or if only Python can express it."""
     if field.default is MISSING or field.default is None:
         return None
     unit = unit_of(field)
@@ -131,7 +131,7 @@ def _default(field: Field[Any]) -> Any:
 
 
 def _words_of_parameters(kind: type) -> dict[str, str]:
-    """What the docstrings of a class and of what it is made of say of each parameter."""
+    """The description of each parameter from the docstrings of a class and its bases."""
     found: dict[str, str] = {}
     for each in reversed(kind.__mro__):
         said = re.search(r"\nArgs:\n(.*?)(?:\n\S|\Z)", inspect.cleandoc(each.__doc__ or "") + "\n", re.DOTALL)
@@ -147,16 +147,16 @@ def _words_of_parameters(kind: type) -> dict[str, str]:
 
 
 def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
-    """The table of an element that does something sensible where it is put.
+    """The table of a new element, with parameters that suit its position.
 
     Args:
-        kind: as camera files call it.
-        z: where, as a length in words.
-        train: the camera that it is put into.
-        names: of elements that there are.
+        kind: its name in camera files.
+        z: its position, a length as text.
+        train: the camera that it is added to.
+        names: of the elements that exist.
 
     Raises:
-        InputError: there is no such kind, or what z says is no length.
+        InputError: unknown kind, or z is not a length.
     """
     if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
         raise InputError(f"there is no element of kind {shown(kind)}: there are {', '.join(ELEMENT_KINDS)}")
@@ -168,7 +168,7 @@ def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
 
 
 def free_name(wanted: str, names: set[str]) -> str:
-    """A name that no other element has: the wanted one, or with a number behind it."""
+    """A name that no other element has: the wanted one, or the wanted one with a number."""
     base = re.sub(r" \d+$", "", wanted)
     number, name = 1, wanted
     while name in names:
@@ -178,7 +178,7 @@ def free_name(wanted: str, names: set[str]) -> str:
 
 
 def _width_at(train: Train, z: float) -> float:
-    """About how wide light is at a place: between the first opening and the sensor, metres."""
+    """Estimated width of the beam at a position between the first opening and the sensor, metres."""
     widths = [2 * half for half in _first_opening(train)] or [min(train.sensor.size)]
     share = min(max(z / train.sensor.z, 0.0), 1.0) if train.sensor.z > 0 else 1.0
     return float((1 - share) * widths[0] + share * min(train.sensor.size))
@@ -216,25 +216,25 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
     },
     "pyramid": lambda long, wide: {"sides": 4, "deflection": 0.01, "diameter": _length(1.2 * wide, 2)},
 }
-"""The parameters of a new element, of the camera's length and light's width where it stands, metres."""
+"""Parameters of a new element, from the length of the camera and the width of the beam there, metres."""
 
 
-# --- what is chosen by name, or brought ---
+# --- chosen by name, or uploaded ---
 
 
 def made_whole(
     where: Any, value: Any, camera: Mapping[str, Any], described: TrainAsWritten
 ) -> list[tuple[Any, Any]]:
-    """What is changed so that a chosen pattern, kernel or surface fits its element.
+    """Complete a change so that a chosen pattern, kernel or surface fits its element.
 
-    One that is chosen by its name alone gets the parameters that it needs, and a mask that becomes an array of
-    cells a width, if it has none. All else is changed as it is said.
+    A pattern, kernel or surface given only by name gets the parameters that it requires. A mask whose pattern
+    becomes an array of cells gets a width if it has none. All other changes are returned unchanged.
 
     Args:
-        where: the path of what is set, in the document.
-        value: what it is set to.
+        where: the path to set, in the document.
+        value: its new value.
         camera: the tables.
-        described: what they describe.
+        described: the camera that the tables describe.
 
     Returns:
         (path, value), in order.
@@ -255,14 +255,14 @@ def made_whole(
 
 
 def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
-    """The cells of a picture, or of an array, that a client brings: shares of light that pass.
+    """The cells of an uploaded image or array: transmissions.
 
     Args:
-        name: of its file, whose ending says what it is.
-        buffers: its bytes, in one.
+        name: of the file; its ending selects the format.
+        buffers: one buffer, the bytes of the file.
 
     Raises:
-        InputError: what readers of camera files refuse, and more than `MOST_BROUGHT` cells.
+        InputError: the readers of camera files do not support it, or it has more than `MOST_BROUGHT` cells.
     """
     if not isinstance(name, str) or len(buffers) != 1:
         raise InputError("a file is brought with its name and its bytes")
@@ -283,7 +283,7 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
 
 
 MOST_BROUGHT = 2**14
-"""Cells of a picture: each state of the bench tells them all."""
+"""Cells of an uploaded image; each state message contains all of them."""
 
 _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
     "bounded": lambda long, wide: {

@@ -1,4 +1,4 @@
-"""What a bench is asked beside its picture: explanations in words, pictures of points, phase space."""
+"""Answers to questions about a camera: explanations as text, images of points, phase space."""
 
 from __future__ import annotations
 
@@ -28,33 +28,35 @@ Json = dict[str, Any]
 QUESTIONS = ("explain", "point spread", "mtf", "phase space")
 LEAST_ACROSS = 33
 MOST_ACROSS = 257
-"""Pixels a side of a point's picture that is shown."""
+"""Limits on the side of an image of a point, pixels."""
 PHASE_SPACE_RAYS = 60_000
 ONE_PLANE_RAYS, ONE_PLANE_RASTER, FRAME_RAYS = 150_000, (240, 192), 10_000
-"""For a picture that is larger: some for each of its cells; and for how far all planes reach."""
+"""For one larger picture: rays and raster of the picture, and rays to find the extent of all planes."""
 FINER = 8
-"""An MTF is made from a point's picture on pixels so many times as fine as the sensor's. What those take from
-contrast stays in it: 1 − sinc(1/8), 3 %, at twice the frequency that the sensor's pixels tell apart."""
+"""An MTF is computed from the image of a point on pixels this many times finer than the sensor's.
+
+Their blur stays in the result: contrast is 1 − sinc(1/8), 3 %, too low at twice the sensor's Nyquist frequency.
+"""
 FREQUENCIES = 513
-"""Points of an MTF each way, at least, before those of too high frequencies are left out."""
+"""Least number of points of an MTF each way, before too high frequencies are dropped."""
 RAYS = 2**15
-"""Where diffusers scatter."""
+"""Rays per point image if diffusers scatter."""
 CELLS = 192
-"""Into which the opening's longer side is divided for a point's picture."""
+"""Divisions of the opening's longer side for the image of a point."""
 
 
 def answer(what: Any, message: Json, train: Train, light_field: LightField) -> tuple[Json, list[bytes]]:
-    """An answer, and the pictures that go with it.
+    """An answer, and its images.
 
     Args:
         what: one of `QUESTIONS`.
-        message: with ``distance``, a length in words, of the point; without it the one in focus. With ``z``, a
-            length in words, of the plane of phase space; without it all planes of the camera.
+        message: may have ``distance`` of the point, a length as text (default: in focus), and ``z`` of the
+            plane of phase space, a length as text (default: all planes of the camera).
         train: the camera.
-        light_field: before it.
+        light_field: the light field before it.
 
     Raises:
-        InputError: another question, or one that this camera has no answer to.
+        InputError: unknown question, or this camera has no answer to it.
     """
     if what == "explain":
         plan = compile_best(train, light_field.grid)
@@ -77,11 +79,11 @@ def _distance(message: Json, train: Train) -> float:
 
 
 def _psf(message: Json, train: Train, finer: int = 1) -> PointSpread:
-    """The picture of a point, by pixels so many times as fine as the sensor's."""
+    """The image of a point, on pixels ``finer`` times as fine as the sensor's."""
     camera, distance = Camera(train.elements, train.sensor), _distance(message, train)
     pitch = min(train.sensor.pitches) / finer
     found = psf(camera, distance, pitch=pitch, cells=CELLS, rays=RAYS)
-    if max(found.shape) < LEAST_ACROSS:  # so that something dark is around it
+    if max(found.shape) < LEAST_ACROSS:  # so that there is a dark surround
         shape = (max(found.shape[0], LEAST_ACROSS), max(found.shape[1], LEAST_ACROSS))
         return psf(camera, distance, pitch=pitch, shape=shape, cells=CELLS, rays=RAYS)
     if max(found.shape) <= finer * MOST_ACROSS:
@@ -106,7 +108,7 @@ def _point_spread(found: PointSpread) -> tuple[Json, list[bytes]]:
 
 
 def _mtf(message: Json, train: Train) -> Json:
-    """Contrast by frequency of the optics alone, up to what twice as many pixels could tell apart."""
+    """Contrast by frequency of the optics alone, up to twice the sensor's Nyquist frequency."""
     found = _psf(message, train, FINER)
     rows, columns = (max(size, FREQUENCIES) for size in found.shape)
     spectrum = mtf(found, shape=(rows, columns))
@@ -121,7 +123,7 @@ def _mtf(message: Json, train: Train) -> Json:
 
 
 def _curve(frequencies: NDArray[Any], values: NDArray[Any], most: float) -> list[list[float]]:
-    """[frequency per millimetre, contrast] from 0 up to a frequency per metre."""
+    """[frequency per millimetre, contrast] from 0 to ``most``, a frequency per metre."""
     return [
         [round(float(frequency) / 1e3, 4), round(float(abs(value)), 4)]
         for frequency, value in zip(frequencies, values, strict=True)
@@ -130,7 +132,7 @@ def _curve(frequencies: NDArray[Any], values: NDArray[Any], most: float) -> list
 
 
 def _phase_space(message: Json, train: Train, light_field: LightField) -> tuple[Json, list[bytes]]:
-    """At all planes of the camera, or at the one that is asked for: then with the frame that holds all of them."""
+    """Phase space at all planes of the camera, or at a given one, then with the extent of all planes."""
     frame, given = None, message.get("z")
     pictures = phase_space_stages(train, light_field, rays=PHASE_SPACE_RAYS if given is None else FRAME_RAYS)
     brightest = max(float(each.radiance.max()) for each in pictures) or 1.0
@@ -143,13 +145,13 @@ def _phase_space(message: Json, train: Train, light_field: LightField) -> tuple[
         {"title": each.title, "z": each.z, "shape": list(each.radiance.shape[:2])} | _frame([each])
         for each in pictures
     ]
-    # Slopes grow upwards, as on paper, and places to the right: a picture is turned by what shows it upright.
+    # Slopes grow upwards and positions to the right, as on paper: `jpeg` rotates images, so flip here.
     drawn = [jpeg(each.radiance[:, ::-1].astype(np.float32), brightest) for each in pictures]
     return {"planes": told, "frame": frame}, drawn
 
 
 def _frame(pictures: Sequence[PhaseSpacePicture]) -> dict[str, list[float]]:
-    """From where to where the places and the slopes of phase space reach in pictures of it."""
+    """The extent in position and slope of pictures of phase space."""
     borders = {"place": [each.first for each in pictures], "slope": [each.second for each in pictures]}
     return {
         name: [float(min(each[0] for each in ends)), float(max(each[-1] for each in ends))]

@@ -1,4 +1,4 @@
-"""Where the light field stands before a camera on a bench: the plane of its views, along the axis and across."""
+"""The position of the light field before a camera: the plane of its views, along the axis and across."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from vcc.optics.train import Train
 Json = dict[str, Any]
 
 FARTHEST = 1e3
-"""Metres that the aperture may stand away from the entrance plane, along and across."""
+"""Largest distance of the aperture from the entrance plane, along and across, metres."""
 NOT_MOVED = "0 mm"
 
 
 @dataclass(frozen=True)
 class Aperture:
-    """The place of the plane in which a light field's views were taken.
+    """The position of the plane in which a light field's views were taken.
 
-    Light keeps its radiance along rays, so that at the entrance plane the light field is the same samples after a
-    flight: a camera that stands d behind the views sees what was Z before them at Z + d.
+    Radiance is constant along rays. Therefore the light field at the entrance plane has the same samples with
+    another frame: for a camera d behind the views, an object at Z before the views is at Z + d.
 
     Args:
-        z: of that plane, a length in words; below 0 before the entrance plane.
+        z: of that plane, a length as text; below 0 before the entrance plane.
         decentre: (right, down) of the views' origin, likewise.
     """
 
@@ -55,20 +55,20 @@ class Aperture:
 
     @property
     def is_moved(self) -> bool:
-        """Whether it is anywhere but in the entrance plane, about the axis."""
+        """Whether the plane differs from the entrance plane, or is off the axis."""
         return any(self.metres)
 
     @property
     def rays(self) -> Affine:
-        """From the views' own plane to the entrance plane."""
+        """The ray map from the views' own plane to the entrance plane."""
         z, right, down = self.metres
         return Affine.propagation(-z) @ Affine.translation(right, down, 0, 0)
 
     def check(self, grid: Grid) -> None:
-        """Refuse a camera that would stand within the scene, where the views do not tell of all light.
+        """Raise `InputError` if the camera would stand within the scene, where the views do not contain all light.
 
         Args:
-            grid: of the light field, where its views were taken.
+            grid: of the light field, in the plane of its views.
         """
         found, z = grid.measured_disparity_range(), self.metres[0]
         nearest = math.inf if found is None else grid.distance_of(found[1])
@@ -91,7 +91,7 @@ class Aperture:
 
     @property
     def in_python(self) -> str:
-        """What a program does to ``light_field``."""
+        """The Python code that moves ``light_field``."""
         z, right, down = self.metres
         return (
             f"light_field = light_field.transformed(\n    vcc.Affine.propagation({-z!r}) @ "
@@ -100,21 +100,21 @@ class Aperture:
 
     @property
     def in_words(self) -> str:
-        """Where it stands."""
+        """The position as text."""
         z, right, down = self.metres
         across = f", {short(right)} to the right and {short(down)} down" if right or down else ""
         return f"z = {short(z)}{across}"
 
     def as_json(self) -> Json:
-        """As documents hold it."""
+        """The position as JSON, for documents."""
         return {"z": self.z, "decentre": list(self.decentre)}
 
 
 def aperture_of(given: Any) -> Aperture:
-    """An aperture as documents hold it; None for one that was not moved.
+    """An aperture from the JSON of a document; None stands for one that was not moved.
 
     Raises:
-        InputError: it is none.
+        InputError: not an aperture.
     """
     if given is None:
         return Aperture()
@@ -127,11 +127,11 @@ def aperture_of(given: Any) -> Aperture:
 
 
 def drawn_aperture(aperture: Aperture, views: LightField, train: Train, axis: int) -> Json:
-    """What the side view shows of it: the borders of the views' cells, and places to which it is pulled.
+    """The aperture in the side view: the borders of the views' cells, and positions to which it snaps.
 
     Args:
-        aperture: where the views stand.
-        views: as they were taken.
+        aperture: the position of the views.
+        views: in their own plane.
         train: the camera.
         axis: 0 for x, 1 for y.
     """

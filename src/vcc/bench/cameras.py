@@ -1,4 +1,4 @@
-"""Cameras to begin with on a bench, for the scene of the demo: published ones, as tables of camera files."""
+"""Example cameras for the scene of the demo: published designs, as tables of camera files."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from vcc.light_field import LightField
 from vcc.showcase.scene import MIDDLE, demo_scene
 
 SCENE = "leaves, chart and town"
-"""What the demo's scene is called on a bench."""
+"""Name of the demo's scene on a bench."""
 SOFT = "leaves, chart and town, without fine detail"
-"""The same as `without_detail` leaves it: what is finer than its tiles a heterodyne camera cannot tell apart."""
+"""The scene after `without_detail`: a heterodyne camera cannot resolve detail finer than its tiles."""
 DETAIL = 1.4
-"""Of the Gaussian that takes it away, pixels of a view: 0.6 pixels of those that the heterodyne camera decodes."""
+"""Sigma of the Gaussian blur, pixels of a view: 0.6 pixels of the views that the heterodyne camera decodes."""
 VIEWS, PIXELS = 9, 320
-"""A side of the demo's light field."""
+"""Views and pixels along a side of the demo's light field."""
 APERTURE = 20 * mm
 WIDE = 25 * mm
-"""Of a view, at `IMAGE`: a little wider than the sensor, so that moving it never looks past the views."""
+"""Width of a view at `IMAGE`: a little more than the sensor, so that a moved sensor stays within the views."""
 IMAGE = 52 * mm
 PITCH = "75 um"
 
@@ -95,20 +95,20 @@ _SENSORS: dict[str, Json] = {
     HETERODYNE: {"z": "52 mm", "shape": [660, 660], "pitch": "36.3 um"},
     PLENOPTIC: {"z": "52.65 mm", "shape": [500, 500], "pitch": "48.6 um"},
 }
-"""Of the cameras that have another one than `_SENSOR`.
+"""Sensors of the cameras that do not use `_SENSOR`.
 
-Lenslets of pitch p, b before the sensor and d behind the lens, have micro-images p·(1 + b/d) = 0.243 mm apart,
-five pixels; a stop of 0.243 mm·d/b = 19.44 mm fills them. Of a mask g before the sensor, with a period P, the
-recording's spectrum has tiles (1 − g/d)/P apart, a fifth of what pixels of 36.3 µm hold; P·d/g = 19.5 mm
-of the lens are told apart, the stop.
+Lenslets of pitch p, b before the sensor and d behind the lens, have micro-images p·(1 + b/d) = 0.243 mm
+apart, five pixels; a stop of 0.243 mm·d/b = 19.44 mm fills them. With a mask of period P, g before the
+sensor, the tiles in the spectrum of the recording are (1 − g/d)/P apart, a fifth of the bandwidth of pixels
+of 36.3 µm. The mask resolves P·d/g = 19.5 mm of the lens, the stop.
 """
 
 
 def cameras(light_field: str) -> dict[str, Document]:
-    """The cameras, as what a bench shows, by their titles.
+    """The cameras as documents, by their titles.
 
     Args:
-        light_field: the name of the one before them; before the heterodyne camera it is `SOFT`.
+        light_field: the name of the light field before them; the heterodyne camera gets `SOFT`.
     """
     found = {}
     for title, elements in _CAMERAS.items():
@@ -118,7 +118,7 @@ def cameras(light_field: str) -> dict[str, Document]:
 
 
 def scenes() -> dict[str, Field]:
-    """The demo's scene before a lens of 50 mm, as it is and `SOFT`, each made when it is first looked at."""
+    """The demo's scene before a lens of 50 mm, as it is and `SOFT`, each computed at first use."""
     source = (
         "from vcc.showcase.scene import demo_scene\n\n"
         f"light_field = demo_scene().light_field(\n    ({VIEWS}, {VIEWS}),\n    ({PIXELS}, {PIXELS}),\n"
@@ -131,11 +131,11 @@ def scenes() -> dict[str, Field]:
 
 
 def without_detail(light_field: LightField) -> LightField:
-    """A light field of bytes whose views are blurred by a Gaussian of `DETAIL` pixels."""
+    """A uint8 light field whose views are blurred by a Gaussian of `DETAIL` pixels."""
     from scipy.ndimage import gaussian_filter
 
     values = np.empty_like(light_field.values)
-    for j, i in np.ndindex(values.shape[:2]):  # a view at a time, so that numbers between bytes take little memory
+    for j, i in np.ndindex(values.shape[:2]):  # one view at a time, so that the float copy is small
         view = light_field.values[j, i].astype(np.float32)
         values[j, i] = np.rint(gaussian_filter(view, (DETAIL, DETAIL, 0), mode="nearest"))
     return light_field.replaced(values)

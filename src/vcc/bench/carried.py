@@ -1,4 +1,4 @@
-"""Messages of a bench as bytes: the length of the JSON, the JSON, then the buffers one after the other."""
+"""Messages of a bench as bytes: the length of the JSON, the JSON, then the buffers in order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _LENGTH = struct.Struct("<I")
 
 
 class DamagedMessage(ValueError):
-    """Bytes that are no message."""
+    """Bytes that are not a message."""
 
 
 def packed(message: dict[str, Any], buffers: Sequence[bytes] = ()) -> bytes:
@@ -25,7 +25,7 @@ def unpacked(data: bytes) -> tuple[dict[str, Any], list[bytes]]:
     """A message and its buffers.
 
     Raises:
-        Damaged: the bytes are none.
+        DamagedMessage: the bytes are not a message.
     """
     if len(data) < _LENGTH.size:
         raise DamagedMessage("a message starts with its length")

@@ -1,16 +1,16 @@
-"""What a camera that folds views into its picture shows beside it: the decoded views, and pictures refocused.
+"""Decoded views and refocused images of a camera that multiplexes views onto its sensor.
 
-A session asks for them by `vcc.bench.session`'s ``ask``:
+A session requests them by the ``ask`` of `vcc.bench.session`:
 
-- ``"decoded"``, with ``distance`` (a length in words) or without, is answered by ``words`` (how many views of how
-  many pixels), ``remarks``, ``views`` and ``shape`` (both rows, columns), ``nearest`` and ``farthest`` (between
-  which a distance may be chosen), ``focus`` (the camera's own) and ``distance``, all in metres, null for
-  infinitely far, and three JPEGs: a sheet of all views, the middle view, the picture refocused on the distance.
-  Where the camera cannot be decoded the answer is ``why``, in words, alone.
-- ``"refocused"``, with ``distance``, is answered by ``distance`` and the picture.
+- ``"decoded"``, optionally with ``distance`` (a length as text), returns ``words`` (the number of views and
+  their pixels), ``remarks``, ``views`` and ``shape`` (both rows, columns), ``nearest`` and ``farthest`` (the
+  range of distances on offer), ``focus`` (the camera's own) and ``distance``, all in metres, null for
+  infinity, and three JPEGs: a sheet of all views, the middle view, the image refocused at the distance. If
+  the camera cannot be decoded, the answer has only ``why``, as text.
+- ``"refocused"``, with ``distance``, returns ``distance`` and the image.
 
-What is decoded is kept until the camera, the light field or the noise is another one; the calibration until the
-camera or the light field is.
+The decoded views are kept until the camera, the light field or the noise changes; the calibration until the
+camera or the light field changes.
 """
 
 from __future__ import annotations
@@ -45,26 +45,26 @@ Result = TypeVar("Result")
 
 QUESTIONS = ("decoded", "refocused")
 MOST_ACROSS = 11
-"""Views along an axis of a sheet: of more, some are left out."""
+"""Views along a side of a sheet; if there are more, some are left out."""
 SHEET = 800
-"""Pixels of a sheet's longer side, at most."""
+"""Largest length of a sheet's longer side, pixels."""
 LINE = 2
 """Pixels between the views of a sheet."""
 AROUND_FOCUS = 2.0
-"""Of a scene whose depth is not known, distances from the focused one over this to infinity are offered."""
+"""For scenes of unknown depth, the range on offer is the distance in focus divided by this, to infinity."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is to be decoded.
+    """The input of decoding.
 
     Args:
         train: the camera.
-        light_field: before it.
-        of: what tells cameras and light fields apart.
-        noise: whether electronics record the picture.
-        picture: makes the whole picture, or gives it where it is there.
-        turn: held while all cores are at work; gives what is to be called meanwhile, and may end the work.
+        light_field: the light field before it.
+        of: the key of the camera and the light field.
+        noise: whether electronics record the image.
+        picture: returns the whole image, and makes it if needed.
+        turn: held while all cores are busy; yields a progress callback, which may end the work.
     """
 
     train: Train
@@ -76,20 +76,20 @@ class Asked:
 
     @property
     def camera(self) -> Camera:
-        """The camera, with its verbs."""
+        """The camera as a `vcc.Camera`."""
         return Camera(self.train.elements, self.train.sensor)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Decoded(Brief):
-    """A decoded light field and how it is shown.
+    """A decoded light field and its display settings.
 
     Args:
-        of: what it was decoded of: `Asked.of` and whether there was noise.
-        decoder: by which.
+        of: its key: `Asked.of`, and whether there was noise.
+        decoder: that decoded it.
         views: the light field.
-        white: the radiance that is shown white, in all its pictures.
-        remarks: warnings, in words.
+        white: the radiance shown as white in all its images.
+        remarks: warnings, as text.
     """
 
     of: Hashable
@@ -100,21 +100,21 @@ class Decoded(Brief):
 
 
 class Decoding:
-    """What a session has decoded last."""
+    """The latest decoded light field and calibration of a session."""
 
     def __init__(self) -> None:
         self._calibrated: tuple[Hashable, Image, tuple[str, ...]] | None = None
         self._decoded: Decoded | None = None
 
     def answer(self, message: Json, asked: Asked) -> Answer:
-        """The answer to one of `QUESTIONS`, and its pictures.
+        """The answer to one of `QUESTIONS`, and its images.
 
         Args:
-            message: what was asked.
-            asked: of which camera.
+            message: the question.
+            asked: the camera and its light field.
 
         Raises:
-            InputError: a distance that is none; for ``"refocused"``, a camera that cannot be decoded.
+            InputError: invalid distance; for ``"refocused"``, a camera that cannot be decoded.
         """
         distance = _distance(message, asked.train)
         try:
@@ -143,7 +143,7 @@ class Decoding:
         recording = taken.image if taken.recording is None else taken.recording
         with asked.turn() as progress:
             if self._calibrated is None or self._calibrated[0] != asked.of:
-                self._calibrated = None  # not two of them at once
+                self._calibrated = None  # never keep two at once
                 found, warned = _with_warnings(decoder.calibration, asked.light_field, progress)
                 self._calibrated = asked.of, found, tuple(f"calibration: {words}" for words in warned)
             _, calibration, of_white = self._calibrated
@@ -154,7 +154,7 @@ class Decoding:
 
 
 def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, list[str]]:
-    """What some work returns, and the messages of its warnings."""
+    """The result of a function, and the messages of its warnings."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         return work(*given), [str(each.message) for each in caught]
@@ -177,7 +177,7 @@ def _answer(decoded: Decoded, distance: float, asked: Asked) -> Json:
 
 
 def _range(asked: Asked, distance: float) -> tuple[float, float]:
-    """The nearest and the farthest distance that are offered: of the scene, and what the camera is focused on."""
+    """The nearest and the farthest distance on offer: the range of the scene and the distance in focus."""
     focus = _focus(asked.train)
     ends = [each for each in scene_distances(asked.light_field.grid).values() if each > 0]
     if not ends:
@@ -187,7 +187,7 @@ def _range(asked: Asked, distance: float) -> tuple[float, float]:
 
 
 def _focus(train: Train) -> float:
-    """What the camera is focused on; infinitely far where nothing real is."""
+    """The distance in focus; infinity if no real plane is in focus."""
     found = focused_distance(train)
     return math.inf if found is None else found
 
@@ -206,18 +206,18 @@ def _finite(distance: float) -> float | None:
 
 def _refocused(decoded: Decoded, distance: float, progress: Progress) -> bytes:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of pixels beyond all views, which are seen to be black
+        warnings.simplefilter("ignore")  # of pixels outside all views, which are visibly black
         picture = refocused(decoded.views, distance, progress=progress)
     return _jpeg(picture.to_numpy(), decoded.white)
 
 
 def _jpeg(upright: Picture, white: float) -> bytes:
-    """A picture that is upright already."""
+    """The JPEG of an image that is upright already."""
     return jpeg(upright[::-1, ::-1], white)
 
 
 def _sheet(views: LightField) -> Picture:
-    """All views side by side, as they stand in the lens seen from behind it, lines between them."""
+    """All views side by side, in their order in the lens as seen from behind it, separated by lines."""
     rows, columns = (spread(count, MOST_ACROSS) for count in views.shape[:2])
     nt, ns = views.shape[2:4]
     factor = max(math.ceil(len(rows) * nt / SHEET), math.ceil(len(columns) * ns / SHEET), 1)

@@ -1,7 +1,7 @@
-"""What an optical bench shows, as data: a camera as the tables of its file, a light field, how it is shown.
+"""The state of an optical bench as data: a camera as the tables of its file, a light field, display settings.
 
-A document is plain JSON. It changes by path, and keeps what the user typed: "41.5 mm" stays that. Who reads it are
-the readers of camera files, so that a bench takes what a file takes and refuses in the same words.
+A document is plain JSON. It is changed by path and keeps text as the user typed it ("41.5 mm"). The readers
+of camera files parse it, so that a bench accepts the same values as a file, with the same error messages.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from vcc.bench.aperture import Aperture, aperture_of
 from vcc.files.camera_reading import Beside, TrainAsWritten, train_of_tables
 
 Step = str | int
-"""One step of a path: the key of a table, or the place in a list."""
+"""One step of a path: the key of a table, or the index in a list."""
 
 MOST_PIXELS = 2**22
-"""Of a sensor on a bench: more would keep its memory and its user waiting."""
+"""Pixels of a sensor; more would take too much memory and time for interactive use."""
 MOST_ALONG_A_SIDE = 2**14
-"""Pixels; tables of one side take some kilobytes a pixel."""
+"""Pixels; tables for one side take some kilobytes per pixel."""
 MOST_CELLS = 2**20
-"""Of a mask that is asked for by name and size."""
+"""Cells of a mask that is given by name and size."""
 MOST_QUANTITIES = 120
-"""In a list, such as the coefficients of a plate: each costs time at each place of the plate."""
+"""Entries of a list, such as the coefficients of a plate: each is evaluated at each point of the plate."""
 MOST_ELEMENTS = 100
 MOST_STEPS = 100
-"""So many steps can be undone."""
+"""Steps that can be undone."""
 MOST_HISTORY = 2**22
-"""Characters of all documents that are kept to be undone."""
+"""Characters of all documents kept for undo."""
 
 _IN_CAMERA = ("elements", "sensor")
 _FIELDS = ("camera", "light_field", "views", "aperture", "exposure", "noise")
@@ -40,7 +40,7 @@ _FIELDS = ("camera", "light_field", "views", "aperture", "exposure", "noise")
 
 @dataclass(frozen=True)
 class Views:
-    """Which views are looked at: a rectangle of them.
+    """A rectangle of selected views.
 
     Args:
         rows: (first, last) row, the last one included.
@@ -52,11 +52,11 @@ class Views:
 
     @property
     def slices(self) -> tuple[slice, slice]:
-        """What takes them from a light field."""
+        """The slices that select the views from a light field."""
         return slice(self.rows[0], self.rows[1] + 1), slice(self.columns[0], self.columns[1] + 1)
 
     def check(self, shape: Sequence[int]) -> None:
-        """Refuse what a light field of this shape does not have."""
+        """Raise `InputError` if a light field of this shape lacks some of the views."""
         for name, (first, last), there in (("rows", self.rows, shape[0]), ("columns", self.columns, shape[1])):
             if not 0 <= first <= last < there:
                 raise InputError(
@@ -71,11 +71,11 @@ class Document:
 
     Args:
         camera: ``elements`` and ``sensor``, the tables of a camera file.
-        light_field: the name of one of those that there are.
-        views: which of its views are looked at; None for all.
-        exposure: the irradiance that is shown white, above 0; None finds it for each picture.
-        noise: whether the sensor's electronics record the picture.
-        aperture: where the plane of its views stands.
+        light_field: the name of a light field that the bench offers.
+        views: the selected views; None for all.
+        exposure: the irradiance shown as white, above 0; None chooses it for each image.
+        noise: whether the sensor's electronics record the image.
+        aperture: the position of the plane of the views.
     """
 
     camera: Mapping[str, Any]
@@ -86,7 +86,7 @@ class Document:
     aperture: Aperture = field(default_factory=Aperture)
 
     def as_json(self) -> dict[str, Any]:
-        """The document as messages and addresses hold it."""
+        """The document as JSON, for messages and URLs."""
         views = self.views and {"rows": list(self.views.rows), "columns": list(self.views.columns)}
         return {
             "camera": self.camera,
@@ -99,10 +99,10 @@ class Document:
 
     @classmethod
     def of_json(cls, given: Any) -> Document:
-        """A document that came from elsewhere; what its camera is, `train` looks at.
+        """A document from JSON; the camera's tables are validated by `train`, not here.
 
         Raises:
-            InputError: it is none.
+            InputError: not a document.
         """
         if not isinstance(given, dict):
             raise InputError(
@@ -124,14 +124,14 @@ class Document:
         )
 
     def changed(self, where: Any, value: Any) -> Document:
-        """The document with another value in one place.
+        """A copy with another value at one path.
 
         Args:
             where: the path: ``["elements", 0, "z"]``, ``["sensor", "pitch"]``, ``["exposure"]``.
-            value: as JSON; None takes away what is there, so that the default holds.
+            value: as JSON; None removes the entry, so that the default applies.
 
         Raises:
-            InputError: there is no such place, or what `of_json` refuses.
+            InputError: the path does not exist, or `of_json` rejects the result.
         """
         path = _path(where)
         whole = self.as_json()
@@ -150,10 +150,10 @@ class Document:
         """The camera that the tables describe.
 
         Args:
-            beside: the files that they may name.
+            beside: the files that the tables may name.
 
         Raises:
-            InputError: what the reader of camera files refuses; what is too large for a bench.
+            InputError: the tables are no valid camera file, or the camera is too large for a bench.
         """
         _check_sizes(self.camera, "the camera")
         elements = self.camera.get("elements", [])
@@ -162,11 +162,11 @@ class Document:
         return train_of_tables(self.camera, beside)
 
     def settled(self, beside: Beside) -> Document:
-        """The same with the sensor's place as a length, where its focus was given instead."""
+        """A copy with the sensor's z as a length if its focus was given instead."""
         sensor = self.camera.get("sensor")
         if not isinstance(sensor, dict) or "focus" not in sensor:
             return self
-        asked = {key: each for key, each in sensor.items() if key != "z"}  # which follows
+        asked = {key: each for key, each in sensor.items() if key != "z"}  # z follows from the focus
         found = replace(self, camera={**self.camera, "sensor": asked}).train(beside)
         z = units.text(found.train.sensor.z, "length", exact=True)
         del asked["focus"]
@@ -174,15 +174,15 @@ class Document:
 
 
 class History:
-    """A document, and those before it that can be had back.
+    """A document with undo and redo.
 
-    What moves (a drag) is shown at once, and is one step when it has come to rest.
+    A drag is shown at once, and counts as one step when it ends.
 
     Args:
         document: the first one.
 
     Attributes:
-        present: what is shown.
+        present: the document shown now.
     """
 
     def __init__(self, document: Document) -> None:
@@ -202,7 +202,7 @@ class History:
         return bool(self._future)
 
     def put(self, document: Document, moving: bool = False) -> None:
-        """Show another document; at rest, that is a step, and what was undone before is forgotten."""
+        """Show another document; unless ``moving``, this adds a step and clears redo."""
         self.present = document
         if moving or document == self._rest:
             return
@@ -212,7 +212,7 @@ class History:
         self._forget()
 
     def undo(self) -> None:
-        """Go back one step, or to where a drag began; nothing where there is none."""
+        """Go back one step, or to the start of a drag; do nothing if there is no step."""
         if self.present != self._rest:
             self.present = self._rest
         elif self._past:
@@ -220,13 +220,13 @@ class History:
             self.present = self._rest = self._past.pop()
 
     def redo(self) -> None:
-        """Go forward again; nothing where nothing was undone."""
+        """Go forward one step; do nothing if nothing was undone."""
         if self._future:
             self._past.append(self._rest)
             self.present = self._rest = self._future.pop()
 
     def _forget(self) -> None:
-        """Let go of the oldest steps where there are too many, or they are too large."""
+        """Drop the oldest steps if there are too many, or they are too large."""
         kept, room = 0, MOST_HISTORY
         for document in reversed(self._past[-MOST_STEPS:]):
             room -= len(json.dumps(document.camera))
@@ -237,7 +237,7 @@ class History:
 
 
 def shown(given: Any, most: int = 60) -> str:
-    """What came from elsewhere, for a message: as JSON, not too long."""
+    """A value from outside as JSON for an error message, truncated."""
     try:
         words = json.dumps(given, ensure_ascii=False)
     except (TypeError, ValueError, RecursionError):
@@ -253,7 +253,7 @@ def _path(where: Any) -> tuple[Step, ...]:
 
 
 def _put(tree: Any, path: tuple[Step, ...], value: Any, place: str) -> Any:
-    """A tree with a value at a path; None takes away what is there. What is not changed is shared."""
+    """A copy of a tree with a value at a path; None removes the entry. Unchanged parts are shared."""
     step, rest = path[0], path[1:]
     inside = f"{place}: {step}" if isinstance(step, str) else f"{place} {step + 1}"
     if isinstance(tree, dict) and isinstance(step, str):
@@ -270,7 +270,7 @@ def _put(tree: Any, path: tuple[Step, ...], value: Any, place: str) -> Any:
 
 
 def _check_sizes(tree: Any, place: str) -> None:
-    """Refuse what has few letters and takes much memory, and what no camera file can hold."""
+    """Raise `InputError` for sizes that need too much memory, and for values that no camera file can hold."""
     if isinstance(tree, dict):
         for key, each in tree.items():
             _check_sizes(each, f"{place}: {key}")

@@ -1,4 +1,4 @@
-"""What a bench gives away: a camera file, a program that makes the same picture, the picture."""
+"""Exports of a bench: a camera file, a Python program that makes the same image, the image."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from vcc.optics.train import Train
 
 KINDS = ("toml", "python", "png", "exr")
 INLINE = 64
-"""Numbers of an array that a program states itself; larger ones are files beside it."""
+"""Numbers of an array that the program contains as text; larger arrays are files next to it."""
 _DATE = (1980, 1, 1, 0, 0, 0)
-"""Of all files in an archive, the earliest there is: the same camera gives the same bytes."""
+"""Date of all files in an archive, the earliest possible: the same camera gives the same bytes."""
 
 
 @dataclass(frozen=True)
 class OnBench:
-    """What is exported.
+    """The input of an export.
 
     Args:
-        document: what is shown.
+        document: the state of the bench.
         train: its camera.
-        source: lines of Python that make ``light_field``; empty where a program cannot have it.
+        source: lines of Python that make ``light_field``; empty if a program cannot make it.
         beside: the files that the camera may name.
     """
 
@@ -50,16 +50,16 @@ class OnBench:
 
 
 def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tuple[str, str, bytes]:
-    """A file: its name, its type and its bytes.
+    """A file: its name, its media type and its bytes.
 
     Args:
         what: one of `KINDS`.
-        bench: what is exported.
-        taken: the whole picture, for "png" and "exr".
-        white: the irradiance that a PNG shows white.
+        bench: the input.
+        taken: the whole image, for "png" and "exr".
+        white: the irradiance that a PNG shows as white.
 
     Raises:
-        InputError: anything else, or what cannot be written.
+        InputError: unknown kind, or the camera cannot be written.
     """
     if what == "toml":
         text, arrays = camera_file(bench.train)
@@ -78,7 +78,7 @@ def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tu
 def _with_arrays(
     stem: str, ending: str, kind: str, text: str, arrays: dict[str, NDArray[np.float64]]
 ) -> tuple[str, str, bytes]:
-    """A text as it is, or with the arrays that it names in a ZIP archive."""
+    """A text file, or a ZIP archive of the text and the arrays that it names."""
     if not arrays:
         return f"{stem}.{ending}", kind, text.encode()
     packed = io.BytesIO()
@@ -92,7 +92,7 @@ def _with_arrays(
 
 
 def _left_out(document: Document) -> str:
-    """What a camera file cannot hold of what is shown, as a comment."""
+    """A comment with the parts of the state that a camera file cannot hold."""
     if not document.aperture.is_moved:
         return ""
     said = f"This file leaves out where the light field stood: {document.aperture.in_words}. In Python:"
@@ -100,7 +100,7 @@ def _left_out(document: Document) -> str:
 
 
 def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
-    """The text of a camera file, and the arrays that stand beside it, by their names."""
+    """The text of a camera file, and the arrays of its array files, by name."""
     import tomli_w
 
     tables, arrays = tables_of_train(train, NOWHERE / "camera.toml")
@@ -111,11 +111,11 @@ def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
 
 
 def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.float64]]]:
-    """A program that makes the picture that a bench shows, and the arrays that it loads.
+    """A program that makes the image that a bench shows, and the arrays that it loads.
 
     Args:
-        bench: what is shown.
-        white: the irradiance that is shown white.
+        bench: the input.
+        white: the irradiance shown as white.
     """
     writer = _Writer({}, set())
     elements = "".join(f"        {writer.made(element)},\n" for element in bench.train.elements)
@@ -155,11 +155,11 @@ _UNITS = {"length": {"mm": mm, "um": um, "nm": nm}, "angle": {"deg": deg}}
 
 @dataclass
 class _Writer:
-    """Writes objects as the Python that makes equal ones.
+    """Writes objects as Python code that creates equal ones.
 
     Args:
-        arrays: put aside, by the name of the file that will hold each.
-        names: of units that were used.
+        arrays: for separate files, by file name.
+        names: of the units used.
     """
 
     arrays: dict[str, NDArray[np.float64]]
@@ -167,7 +167,7 @@ class _Writer:
     uses_numpy: bool = False
 
     def made(self, thing: Any) -> str:
-        """A call of the thing's class with the parameters that are not at their defaults."""
+        """A call of the object's class with the parameters that differ from their defaults."""
         parts = []
         for name, field in parameters_of(type(thing)).items():
             value = getattr(thing, name)
@@ -199,7 +199,7 @@ class _Writer:
         raise InputError(f"a {type(value).__name__} of Python's own cannot be written into a program")
 
     def quantity(self, value: float, unit: str) -> str:
-        """A number with the unit in which it is short, if that gives the very same number."""
+        """A number with the unit that makes it short, if the product is exactly the same number."""
         best = _number(value)
         for name, factor in _UNITS[unit].items():
             count = f"{value / factor:.12g}"
@@ -210,7 +210,7 @@ class _Writer:
         return best
 
     def array(self, values: NDArray[np.float64]) -> str:
-        """An array: stated, or loaded from a file beside the program."""
+        """An array: inline, or loaded from a file next to the program."""
         self.uses_numpy = True
         if values.size <= INLINE:
             return f"np.array({values.tolist()!r})"
@@ -225,7 +225,7 @@ def _number(value: float) -> str:
 
 
 def _module_of(thing: Any) -> str:
-    """Where users find the class of a thing."""
+    """The public module that exports the object's class."""
     if isinstance(thing, Element | Sensor | Electronics):
         return "vcc"
     family = next((each for each in FAMILIES if isinstance(thing, each.base)), None)

@@ -1,4 +1,4 @@
-"""How far away what a pixel of a picture shows is, by the light field's own depth."""
+"""The distance of the object at a pixel of an image, from the depth of the light field."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from vcc.optics.train import Train
 from vcc.recover.depth import depth_by_structure_tensor
 
 PATCH = 24
-"""Pixels of a view around the one that is looked at, each way, of which depth is found."""
+"""Pixels each way around the pixel of the view, in which depth is estimated."""
 NEAR = 2
-"""Those whose depth counts."""
+"""Pixels each way whose depth is averaged."""
 
 
 def distance_at(train: Train, light_field: LightField, share: tuple[float, float]) -> float:
-    """The distance of what a place of the picture shows, metres before the entrance plane.
+    """The distance of the object at a position of the image, metres before the entrance plane.
 
-    The ray through the middle view that lands there says which of its pixels to look at; how what it shows moves
-    from view to view says how far away it is.
+    The ray through the middle view that lands there selects one of its pixels. The disparity at this pixel
+    gives the distance.
 
     Args:
-        train: the camera; where it bends light otherwise than by matrices, what does so is passed over.
-        light_field: before it.
-        share: the place on the sensor, (down, across), 0 to 1, as light lands on it.
+        train: the camera; elements that do not act by matrices are ignored.
+        light_field: the light field before it.
+        share: the position on the sensor, (down, across), 0 to 1, in the orientation of the sensor.
 
     Raises:
-        InputError: one view only, a place that the middle view does not see, or nothing there that shows depth.
+        InputError: a single view, a position outside the middle view, or no texture there that shows depth.
     """
     nv, nu, nt, ns = light_field.shape[:4]
     if nv * nu == 1:
@@ -72,5 +72,5 @@ def _pixel_of_middle_view(train: Train, light_field: LightField, share: tuple[fl
 def _of_pixels(
     linear: NDArray[np.float64], offset: NDArray[np.float64], i: int, j: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places on the sensor by (column, row) of a view's pixels: the matrix, and the place of pixel (0, 0)."""
+    """The affine map from (column, row) of a view's pixels to the sensor: its matrix, and the image of (0, 0)."""
     return linear[:2, 2:], linear[:2, :2] @ np.array([i, j], dtype=np.float64) + offset[:2]

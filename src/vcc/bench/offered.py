@@ -1,4 +1,4 @@
-"""What a bench was started with: light fields, a camera to begin with, the files that may be read."""
+"""The inputs of a bench: light fields, a camera to start with, the files that may be read."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ from vcc.files.camera_reading import Beside
 from vcc.light_field import LightField
 
 LONG = 0.2
-"""Seconds after which those who wait for a picture are let pass."""
+"""Seconds after which waiting clients get their turn."""
 
 Opened = Callable[[Progress | None], LightField]
-"""What opens a light field when it is first asked for."""
+"""A function that opens a light field on demand."""
 
 
 class Field:
-    """A light field on a bench, opened when it is first looked at, and the coarser ones made of it.
+    """A light field on a bench, opened at first use, with coarser copies of it.
 
     Args:
-        light_field: the light field, or what opens it.
-        source: how a program opens it: an expression of Python; empty where there is none.
+        light_field: the light field, or a function that opens it.
+        source: Python code with which a program opens it; empty if there is none.
     """
 
     def __init__(self, light_field: LightField | Opened, source: str = "") -> None:
@@ -57,10 +57,10 @@ class Field:
         return self.with_pixels_of(1, progress)
 
     def with_pixels_of(self, step: int, progress: Progress | None = None) -> LightField:
-        """The light field with pixels so many times as large each way, means over those that they cover.
+        """The light field with blocks of step×step pixels averaged.
 
         Args:
-            step: a power of two; as many as a view has, where that is less.
+            step: a power of two; limited by the number of pixels of a view.
             progress: called while it is opened.
 
         Raises:
@@ -68,22 +68,22 @@ class Field:
         """
         found = self._by_step.get(step)
         if found is not None:
-            return found  # without waiting for who makes another
+            return found  # without waiting for the lock
         with self._lock:
             if 1 not in self._by_step:
                 opened = self._opened
                 self._by_step[1] = opened if isinstance(opened, LightField) else opened(progress)
-            for coarser in [2**n for n in range(1, step.bit_length())]:  # each of the one before: quicker
+            for coarser in [2**n for n in range(1, step.bit_length())]:  # each from the one before: faster
                 if coarser not in self._by_step:
                     self._by_step[coarser] = _halved(self._by_step[coarser // 2])
             return self._by_step[step]
 
 
 class Turn:
-    """Held by who makes a picture, which takes all cores: one at a time, in the order of coming.
+    """A fair lock for work that uses all cores: one holder at a time, in order of arrival.
 
-    Who has held it for long lets those pass who wait, and goes on when it is its turn again: a small picture does
-    not wait for all of a large one.
+    A long task lets waiting tasks pass and continues at its next turn, so that a small image does not wait
+    for all of a large one.
     """
 
     def __init__(self) -> None:
@@ -93,10 +93,12 @@ class Turn:
 
     @contextmanager
     def held(self, check: Callable[[], None] = lambda: None) -> Iterator[Callable[[], float]]:
-        """Hold it; gives what lets others pass, to be called now and then, which says how long that took, seconds.
+        """Hold the lock; yield a function to call from time to time that lets others pass.
+
+        The function returns the seconds that it waited.
 
         Args:
-            check: called while waiting; what it raises ends that.
+            check: called while waiting; an exception that it raises ends the wait.
         """
         mine = object()
         with self._changed:
@@ -132,14 +134,14 @@ class Turn:
 
 @dataclass(frozen=True)
 class Offered:
-    """What a bench was started with, shared by all who look at it.
+    """The inputs of a bench, shared by all its clients.
 
     Args:
         fields: light fields by name.
-        start: what is shown first.
+        start: the first document.
         beside: the files that cameras may name.
-        gallery: cameras to begin with, by their titles.
-        turn: held by who makes a picture.
+        gallery: example cameras by their titles.
+        turn: the lock to hold while making an image.
     """
 
     fields: Mapping[str, Field]
@@ -149,7 +151,7 @@ class Offered:
     turn: Turn = field(default_factory=Turn, compare=False)
 
     def field(self, name: str) -> Field:
-        """The light field of a name.
+        """The light field of this name.
 
         Raises:
             InputError: there is none.
@@ -160,14 +162,14 @@ class Offered:
 
 
 def _halved(light_field: LightField) -> LightField:
-    """Means over two pixels each way, where there are two; a border that does not fill a pixel is left out."""
+    """Means over two pixels each way, if there are two; an incomplete pixel at the border is dropped."""
     rows, columns = (min(2, size) for size in light_field.shape[2:4])
     values = to_numpy(light_field.values)
     nv, nu, nt, ns = values.shape[:4]
     whole = values[:, :, : nt // rows * rows, : ns // columns * columns]
     shape = (nv, nu, nt // rows, ns // columns, *values.shape[4:])
     coarse = np.empty(shape, values.dtype if values.dtype.kind == "u" else np.float32)
-    for j, i in np.ndindex(nv, nu):  # one view at a time, so that the sums take little memory
+    for j, i in np.ndindex(nv, nu):  # one view at a time, to save memory
         coarse[j, i] = _mean(whole[j, i], rows, columns, coarse.dtype)
     to_fine = Affine.translation(0, 0, (columns - 1) / 2, (rows - 1) / 2) @ Affine.scaling(1, 1, columns, rows)
     found = light_field.measured_disparity_range()

@@ -1,4 +1,4 @@
-"""Pictures for a bench: coarse ones while something moves, whole ones at rest, and how they go to a screen."""
+"""Images for a bench: coarse ones during a drag, whole ones at rest, and their encoding for a screen."""
 
 from __future__ import annotations
 
@@ -38,62 +38,62 @@ from vcc.run.expose import Exposure
 Picture = NDArray[np.float32]
 
 IN_TIME = 0.02
-"""Seconds that a picture may take while something moves: a coarser one is made where a finer takes longer."""
+"""Time limit of an image during a drag, seconds: if a finer one takes longer, a coarser one is made."""
 LONGER, SHORTER = 0.2, 0.6
-"""How much the last picture counts in what the next is expected to take: a busy machine makes some take longer."""
+"""Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
 FORGOTTEN = 0.99
-"""Of what a finer picture took, with each coarser one: after some 140 it is thought to take half as long."""
+"""Factor on the times of finer images with each coarser one: after some 140 the expected time has halved."""
 MOST_KINDS = 50
-"""Of cameras whose time is remembered."""
+"""Camera kinds whose times are remembered."""
 FEWEST_RAYS = 2
-"""Through a window or a cell, by which a run tells how far they differ."""
+"""Rays through a window or a cell: the least from which a run can estimate their variance."""
 SHADES = 4096
-"""Of linear light, told apart in pictures for the screen."""
+"""Levels of linear light in images for the screen."""
 QUALITY = {False: 95, True: 75}
-"""Of JPEG, whole and coarse."""
+"""JPEG quality of whole (False) and coarse (True) images."""
 SUBSAMPLING = {False: "444", True: "420"}
-"""Of JPEG's colours: single pixels of a whole picture are looked at."""
+"""JPEG chroma subsampling: users inspect single pixels of a whole image."""
 
 
 @dataclass(frozen=True)
 class Fineness:
-    """How much of the light field and of the sensor a picture is made of: all views, always.
+    """Resolution at which an image is made; all views are always used.
 
-    With fewer views what is out of focus would fall apart into copies that are not in the whole picture.
+    With fewer views, objects out of focus would split into copies that the whole image does not have.
 
     Args:
-        pixels: of sensor and views, so many each way are one.
-        rays: a pixel, where rays are traced; None takes as many as always.
+        pixels: this many pixels each way, of the sensor and of the views, are merged into one.
+        rays: per pixel, if rays are traced; None for the default.
     """
 
     pixels: int
     rays: int | None
 
     def share(self, by_rays: bool) -> float:
-        """About how much of the work of a whole picture it is, at most."""
+        """Upper estimate of the work, relative to a whole image."""
         rays = self.rays / DEFAULT_SAMPLES if by_rays and self.rays is not None else 1.0
         return rays / self.pixels**2
 
 
 WHOLE = Fineness(1, None)
 COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(8, 4))
-"""What is made in time, finest first."""
+"""Choices for images in time, finest first."""
 COARSEST = COARSER[-1].pixels
-"""Of a view, so many each way are one at most."""
+"""Pixels of a view, each way, that are merged into one at most."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Taken(Brief):
-    """A picture, and what is known of it.
+    """An image and the details of how it was made.
 
     Args:
-        image: irradiance, or what the recording tells of it.
+        image: irradiance, or its estimate from the recording.
         recording: by the sensor's electronics; None without noise.
-        plan: by which it was made.
-        found: what the run told.
-        coarse: whether fewer pixels or rays were taken.
-        seconds: that it took.
-        planning: seconds of these until the plan was there.
+        plan: the plan that made it.
+        found: the result of the run.
+        coarse: whether fewer pixels or rays were used.
+        seconds: total time.
+        planning: the part of these seconds before the plan was ready.
     """
 
     image: Image
@@ -106,29 +106,30 @@ class Taken(Brief):
 
     @property
     def values(self) -> Picture:
-        """Irradiance as light lands on the sensor, (rows, columns[, channels])."""
+        """Irradiance in the orientation of the sensor, (rows, columns[, channels])."""
         values: Picture = self.image.values
         return values
 
 
 class Pace:
-    """How fine a picture may be to be there in time, by what those before of the same kinds of elements took.
+    """Chooses the fineness of an image from the times of earlier images of the same kinds of elements.
 
-    What was not made yet is expected to take the time of others for its plan, and its share of theirs for its run.
-    What a picture took is forgotten where a finer one takes less, as kernels were compiled for the first; and it
-    is thought to be a little less with each coarser one, so that it is tried again when the machine was busy.
+    For a fineness without a measurement, the estimate is the planning time of another fineness plus its run
+    time scaled by the work. A measurement is dropped if a finer image takes less time, as the first included
+    the compilation of kernels. It also decays a little with each coarser image, so that the finer one is
+    tried again after a busy period.
     """
 
     def __init__(self) -> None:
         self._kept: dict[Hashable, _Kept] = {}
 
     def noted(self, of: Hashable, fineness: Fineness, taken: Taken) -> None:
-        """A picture took so long.
+        """Record the time of an image.
 
         Args:
-            of: what tells cameras and light fields apart that take about as long.
-            fineness: of the picture.
-            taken: the picture.
+            of: the key of cameras and light fields that take about the same time.
+            fineness: of the image.
+            taken: the image.
         """
         kept = self._kept.pop(of, None)
         if kept is None or kept.by_rays != taken.plan.by_rays:
@@ -150,11 +151,11 @@ class Pace:
             del self._kept[next(iter(self._kept))]
 
     def seconds(self, of: Hashable) -> float | None:
-        """How long a whole picture is expected to take; None where none was made yet."""
+        """Expected time of a whole image, seconds; None without measurements."""
         return self._kept[of].expected(WHOLE) if of in self._kept else None
 
     def fineness(self, of: Hashable) -> Fineness:
-        """The finest that is expected in time; the coarsest where none is."""
+        """The finest expected in time, or else the coarsest; without measurements, the finest coarse one."""
         if of not in self._kept:
             return COARSER[0]
         kept = self._kept[of]
@@ -163,18 +164,18 @@ class Pace:
 
 @dataclass(frozen=True)
 class _Kept:
-    """What pictures of one kind took.
+    """Measured times of images of one kind.
 
     Args:
         by_rays: whether rays made them.
-        took: for each share of the work that was done, seconds until its plan was there, and in all.
+        took: (seconds until the plan was ready, seconds in all) by share of the work.
     """
 
     by_rays: bool
     took: dict[float, tuple[float, float]]
 
     def expected(self, fineness: Fineness) -> float:
-        """Seconds that a picture is expected to take."""
+        """Expected time of an image, seconds."""
         share = fineness.share(self.by_rays)
         if share in self.took:
             return self.took[share][1]
@@ -184,10 +185,10 @@ class _Kept:
 
 
 def light_field_of(field: Field, views: Views | None, fineness: Fineness, progress: Progress | None) -> LightField:
-    """The part of a light field that a picture is made of.
+    """The part of a light field that an image is made of.
 
     Raises:
-        InputError: views that it does not have, or a light field that cannot be opened.
+        InputError: the light field lacks the views, or cannot be opened.
     """
     chosen = field.with_pixels_of(fineness.pixels, progress)
     if views is None:
@@ -197,7 +198,7 @@ def light_field_of(field: Field, views: Views | None, fineness: Fineness, progre
 
 
 def coarser_sensor(train: Train, step: int) -> Train:
-    """The camera with so many pixels of its sensor in one, each way, over the same area."""
+    """The camera with blocks of step×step pixels of its sensor merged, over the same area."""
     sensor = train.sensor
     rows, columns = (max(round(size / step), 1) for size in sensor.shape)
     pitch = sensor.size[0] / rows, sensor.size[1] / columns
@@ -205,7 +206,7 @@ def coarser_sensor(train: Train, step: int) -> Train:
 
 
 def out_of_focus(train: Train) -> Train:
-    """The camera with its sensor a twelfth further away, where most scenes are sharp nowhere."""
+    """The camera with its sensor a twelfth further away, where most scenes are entirely out of focus."""
     return Train(train.elements, replace(train.sensor, z=train.sensor.z * 13 / 12))
 
 
@@ -216,17 +217,17 @@ def take(
     fineness: Fineness = WHOLE,
     progress: Progress | None = None,
 ) -> Taken:
-    """The picture that a bench shows.
+    """The image that a bench shows.
 
     Args:
         train: the camera.
-        field: before it.
-        document: which views, and whether electronics record the picture.
-        fineness: a coarse picture has no noise: it has other pixels than the sensor's.
-        progress: called with (done, total), while it is planned, too; what it raises ends the work.
+        field: the light field.
+        document: selects the views, and whether electronics record the image.
+        fineness: a coarse image has no noise, because its pixels are not those of the sensor.
+        progress: called with (done, total), also during planning; an exception that it raises ends the work.
 
     Raises:
-        InputError: what the camera refuses of this light field, or electronics that cannot record it.
+        InputError: the camera does not support this light field, or the electronics cannot record it.
     """
     began = time.perf_counter()
     light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
@@ -254,7 +255,7 @@ def take(
 
 
 def _with_fewer_rays(plan: Plan, rays: int) -> Plan:
-    """A plan with fewer rays, that look at views as they are: sharper ones would only show the noise of so few."""
+    """A plan with fewer rays and without sharpening of views, which would only amplify their noise."""
     assert isinstance(plan.core, Rays)
     fewer = max(plan.core.samples * rays // DEFAULT_SAMPLES, FEWEST_RAYS)
     before = tuple(operator for operator in plan.before if not isinstance(operator, SharpenViews))
@@ -262,14 +263,15 @@ def _with_fewer_rays(plan: Plan, rays: int) -> Plan:
 
 
 def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
-    """A plan whose rays look at the same views with coarser pixels.
+    """A plan whose rays read the same views with coarser pixels.
 
-    Through a lenslet a pixel sees as much of the scene as the lenslet is wide, which is several samples: few rays
-    find their mean with less noise where they look at means, and where neighbours look at the same ones.
+    Through a lenslet, a pixel sees a part of the scene as wide as the lenslet, which is several samples. A
+    few rays estimate its mean with less noise if they read averaged samples, and if neighbours read the same
+    ones.
     """
     coarse_from_fine = coarse.frame.inverse() @ fine.frame
     (top, _), (left, _), (above, _), (before, _) = plan.halo
-    border = Affine.translation(left, top, before, above)  # as many samples, coarse as fine
+    border = Affine.translation(left, top, before, above)  # the same number of samples, coarse and fine
     nv, nu, nt, ns = plan.shape(coarse.shape)[:4]
     made = replace(
         core,
@@ -284,16 +286,16 @@ def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
 
 
 def white_of(values: Picture) -> float:
-    """The irradiance that is shown white where nobody chose one: as `vcc.Image.save` does it."""
+    """The default irradiance shown as white, as in `vcc.Image.save`."""
     return 1 / auto_exposure(_shown(values))
 
 
 def codes(values: Picture, white: float) -> NDArray[np.uint8]:
-    """A picture as people see it: upright, the sRGB codes of 8 bits.
+    """An image for display: upright, 8-bit sRGB codes.
 
     Args:
-        values: irradiance as light lands on the sensor.
-        white: the irradiance that is shown white.
+        values: irradiance in the orientation of the sensor.
+        white: the irradiance shown as white.
     """
     scaled = _shown(values)[::-1, ::-1] * np.float32((SHADES - 1) / white)
     np.nan_to_num(scaled, copy=False)
@@ -306,9 +308,9 @@ def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
     """`codes` as a JPEG.
 
     Args:
-        values: irradiance as light lands on the sensor.
-        white: the irradiance that is shown white.
-        coarse: packed harder.
+        values: irradiance in the orientation of the sensor.
+        white: the irradiance shown as white.
+        coarse: whether to compress more.
     """
     import imagecodecs
 
@@ -319,13 +321,13 @@ def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
 
 @functools.cache
 def _codes() -> NDArray[np.uint8]:
-    """The sRGB code of each shade of linear light."""
+    """The sRGB code of each level of linear light."""
     codes: NDArray[np.uint8] = encode(np.arange(SHADES, dtype=np.float32) / np.float32(SHADES - 1), 8)
     return codes
 
 
 def _shown(values: Picture) -> Picture:
-    """What a screen can show: three channels as colours, of any other number their mean."""
+    """Channels for a screen: one or three as they are, otherwise their mean."""
     if values.ndim == 2 or values.shape[2] == 3:
         return values
     mean: Picture = values.mean(axis=2, dtype=np.float32)
@@ -333,12 +335,12 @@ def _shown(values: Picture) -> Picture:
 
 
 def psnr(one: Picture, other: Picture, white: float) -> float | None:
-    """10·log10(white² / mean of the squared difference), dB, in linear light; None of pictures of other sizes.
+    """10·log10(white² / mean squared difference), dB, in linear light; None if the sizes differ.
 
     Args:
         one: irradiance.
         other: likewise.
-        white: the irradiance that counts as the largest.
+        white: the irradiance that counts as the peak.
     """
     if one.shape != other.shape:
         return None
@@ -347,15 +349,15 @@ def psnr(one: Picture, other: Picture, white: float) -> float | None:
 
 
 def pixel_at(shape: Sequence[int], x: Any, y: Any) -> tuple[int, int]:
-    """(row, column) on the sensor of a pixel of the upright picture.
+    """(row, column) on the sensor of a pixel of the upright image.
 
     Args:
-        shape: of the picture.
-        x: the pixel's column in the upright picture, from 0.
+        shape: of the image.
+        x: the pixel's column in the upright image, from 0.
         y: its row.
 
     Raises:
-        InputError: there is no such pixel.
+        InputError: the pixel does not exist.
     """
     rows, columns = shape[:2]
     if type(x) is not int or type(y) is not int or not (0 <= x < columns and 0 <= y < rows):

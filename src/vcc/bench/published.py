@@ -1,4 +1,4 @@
-"""The gallery's cameras on a bench: by the gallery's own definitions, at a size that suits the bench's scene."""
+"""The gallery's cameras on a bench: the gallery's own definitions, scaled to the bench's scene."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ from vcc.showcase.bench import FOCAL_LENGTH, RIM, Bench
 from vcc.showcase.scene import FAR, MIDDLE, NEAR
 
 LENSLET_PIXELS = 8
-"""Pixels across a lenslet, nearly as many as the bench's scene has views; the prototype had 14."""
+"""Pixels across a lenslet, nearly the number of views of the bench's scene; the prototype had 14."""
 INSIDE = 0.94
-"""How much of what a view shows a sensor looks at, as the gallery's pictures of its scene do."""
+"""The part of a view that the sensor covers, as in the gallery's images of its scene."""
 
 
 def _depth(bench: Bench) -> Train:
-    """Without the closed form of the scene, whose views it would render anew: only their shape counts here."""
+    """Without the analytic scene, so that its views are not rendered again: only their shape is needed here."""
     return blur_by_blocks.designed(replace(bench, scene=None)).camera("code")
 
 
@@ -57,7 +57,7 @@ def _wavefront(bench: Bench) -> Train:
 
 
 def _plenoptic(bench: Bench) -> Train:
-    """Lenslets twice as wide as the scene's views ask for: a fourth of the pixels, whose picture takes seconds."""
+    """Lenslets twice as wide as those matched to the scene: a fourth of the pixels, an image in seconds."""
     coarser = replace(
         bench, light_field=bench.light_field[:, :, ::2, ::2], pitch=(2 * bench.pitch[0], 2 * bench.pitch[1])
     )
@@ -77,7 +77,7 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
         (wavefront_coding.ENTRY, _wavefront),
     )
 }
-"""Entries by their names, and what makes the camera of each for a light field before a lens."""
+"""Entries by name, each with a function that designs its camera for a light field before a lens."""
 
 LEFT_OUT: Mapping[str, str] = {
     "good-apertures": "it compares many apertures of one lens, and is no single camera: open "
@@ -93,10 +93,10 @@ LEFT_OUT: Mapping[str, str] = {
 
 
 def title_of(name: str) -> str:
-    """What a bench calls an entry of the gallery.
+    """The title of a gallery entry on a bench.
 
     Raises:
-        InputError: there is no such entry, or it is no camera for a bench.
+        InputError: there is no such entry, or its camera is not available on a bench.
     """
     if name in LEFT_OUT:
         raise InputError(f"the gallery's {name} is not on the bench: {LEFT_OUT[name]}")
@@ -106,11 +106,11 @@ def title_of(name: str) -> str:
 
 
 class Gallery(Mapping[str, Document]):
-    """Cameras by their titles, the published ones made when they are asked for.
+    """Cameras by title; the published ones are designed on access.
 
     Args:
-        given: what comes first.
-        light_field: the name of the one before the published ones.
+        given: the cameras listed first.
+        light_field: the name of the light field before the published ones.
     """
 
     def __init__(self, given: Mapping[str, Document], light_field: str) -> None:
@@ -130,7 +130,7 @@ class Gallery(Mapping[str, Document]):
 
 
 def without_samples() -> Bench:
-    """The bench's scene without its samples: cameras are designed by where views stand and look."""
+    """The bench's scene without samples: the design of cameras depends only on the geometry of the views."""
     nothing = np.broadcast_to(np.uint8(0), (VIEWS, VIEWS, PIXELS, PIXELS, 3))
     views = LightField.from_views(nothing, APERTURE / VIEWS, WIDE / PIXELS / IMAGE, MIDDLE)
     pitch = INSIDE * WIDE / PIXELS
@@ -144,7 +144,7 @@ def _document(camera: Train, light_field: str) -> Document:
 
 
 def _with_numbers(tree: Any, arrays: Mapping[str, Any]) -> Any:
-    """Tables with arrays in the places of the files that would hold them."""
+    """Tables with arrays in place of the names of array files."""
     if isinstance(tree, dict):
         return {key: _with_numbers(each, arrays) for key, each in tree.items()}
     if isinstance(tree, list):

@@ -1,4 +1,4 @@
-"""The bench in a browser: pages and a WebSocket on this machine, a session for each client."""
+"""The bench in a browser: pages and a WebSocket on this machine, one session per client."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 LOOPBACK = "127.0.0.1"
 OF_THIS_MACHINE = (LOOPBACK, "localhost", "::1")
 MOST_CLIENTS = 10
-"""At once; those who are gone and may come back are among them."""
+"""Concurrent clients, including disconnected ones that may come back."""
 KEPT = 600.0
-"""Seconds for which a client that is out of reach may come back to what it had."""
+"""Seconds for which the session of a disconnected client is kept."""
 LARGEST_MESSAGE = 2**20
 """Bytes of a message that a client may send."""
 MOST_UNSENT = 2**26
-"""Bytes that may wait for a client that does not take them: it is let go then."""
+"""Bytes that may wait for a slow client; above, it is disconnected."""
 NEWEST_ONLY = ("picture", "state", "progress", "notes", "value")
-"""Of these only the newest is worth sending."""
+"""Kinds of messages of which only the newest is sent."""
 STATIC = "static"
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
-"""Endings of what is served, and their types."""
+"""File endings that are served, and their media types."""
 HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; "
@@ -55,16 +55,16 @@ HEADERS = {
 }
 
 TOO_MANY, BROKEN, FORBIDDEN = 1013, 1008, 4403
-"""Why a WebSocket is closed: try again later, a message that is none, no token."""
+"""Close codes of the WebSocket: try again later, invalid message, missing token."""
 
 
 @dataclass(frozen=True)
 class Door:
-    """Who may come in.
+    """Access control of a bench.
 
     Args:
-        host: the address that is listened at.
-        token: that clients must know; empty on this machine alone.
+        host: the address that the server listens on.
+        token: required from clients; empty if only this machine can connect.
     """
 
     host: str = LOOPBACK
@@ -72,20 +72,20 @@ class Door:
 
     @classmethod
     def of(cls, host: str) -> Door:
-        """On this machine all who can reach it; elsewhere those with a token."""
+        """Free access from this machine; a random token for any other host."""
         return cls(host, "" if host in OF_THIS_MACHINE else secrets.token_urlsafe(24))
 
     def opens(self, token: str | None, origin: str | None, asked: str | None) -> bool:
-        """Whether a client may come in.
+        """Whether a client may connect.
 
-        Pages from elsewhere may open sockets to this machine: what a browser says of where a page comes from must
-        be what it asked for; and on this machine, that must be this machine by name, so that no name of somebody
-        else's stands for it.
+        Web pages of other sites may open sockets to this machine. Therefore the origin that the browser
+        reports must equal the requested host. Without a token, that host must be a name of this machine, so
+        that a foreign domain that resolves to this machine is rejected.
 
         Args:
-            token: that it told.
-            origin: of the page, as its browser says; None without a browser.
-            asked: the host that it asked for.
+            token: sent by the client.
+            origin: of the page, as reported by the browser; None without a browser.
+            asked: the requested host.
         """
         if self.token:
             if not hmac.compare_digest((token or "").encode(), self.token.encode()):
@@ -104,10 +104,10 @@ def _name_of(host: str | None) -> str | None:
 
 
 class Outbox:
-    """What waits to be sent to one client; the newest picture takes the place of one that was not sent.
+    """Messages that wait to be sent to one client; a newer image replaces an unsent one.
 
     Args:
-        wake: called, from any thread, when there is something; and when the client is to be let go.
+        wake: called from any thread if there is a message, or if the client must be disconnected.
     """
 
     def __init__(self, wake: Callable[[], None]) -> None:
@@ -117,7 +117,7 @@ class Outbox:
         self.overfull = False
 
     def put(self, message: dict[str, Any], buffers: Sequence[bytes]) -> None:
-        """Add a message; from any thread."""
+        """Add a message; callable from any thread."""
         kind, data = str(message["is"]), packed(message, buffers)
         with self._lock:
             if kind in NEWEST_ONLY:
@@ -127,21 +127,21 @@ class Outbox:
         self._wake()
 
     def take(self) -> list[bytes]:
-        """All that waits."""
+        """Remove and return all waiting messages."""
         with self._lock:
             taken, self._waiting = self._waiting, []
         return [data for _, data in taken]
 
 
 class Clients:
-    """Those who look at a bench, and those who did a moment ago.
+    """The connected clients of a bench, and those that disconnected recently.
 
-    A client is told a key when it comes. With it, and in no other way, it comes back to what it had (its steps,
-    the pinned picture) after its connection broke: a laptop that slept, a network that was gone.
+    Each client receives a key. After its connection broke (a laptop that slept, a lost network), the key
+    alone restores its session: undo history and pinned image.
 
     Args:
-        offered: what there is.
-        door: who may come in.
+        offered: the light fields, cameras and files of the bench.
+        door: access control.
     """
 
     def __init__(self, offered: Offered, door: Door) -> None:
@@ -151,7 +151,7 @@ class Clients:
         self._gone: dict[str, asyncio.TimerHandle] = {}
 
     async def serve(self, socket: WebSocket) -> None:
-        """One client, from its coming to its going."""
+        """Serve one client until it disconnects."""
         headers, asked = socket.headers, socket.query_params
         if not self.door.opens(asked.get("token"), headers.get("origin"), headers.get("host")):
             await socket.close(FORBIDDEN)
@@ -173,7 +173,7 @@ class Clients:
         try:
             keep = await _received(socket, session)
         finally:
-            if self._sockets.get(key) is socket:  # else the client came back by another one
+            if self._sockets.get(key) is socket:  # otherwise the client has reconnected through another socket
                 self._leave(key, keep)
             sending.cancel()
             with contextlib.suppress(asyncio.CancelledError, Exception):
@@ -183,11 +183,11 @@ class Clients:
         return key in self._sessions or bool(self._gone) or len(self._sessions) < MOST_CLIENTS
 
     def _session(self, key: str | None, socket: WebSocket, outbox: Outbox) -> tuple[str, Session]:
-        """That of the key, or a new one with a key of its own, for which the one longest gone makes room."""
+        """The session of a key, or a new session with a new key; the longest disconnected one makes room."""
         if key is not None and key in self._sessions:
             if key in self._gone:
                 self._gone.pop(key).cancel()
-            else:  # a connection that broke and was not seen to
+            else:  # a broken connection that was not noticed
                 self._closing = asyncio.create_task(_closed(self._sockets[key]))
             self._sessions[key].go_on(outbox.put)
         else:
@@ -199,7 +199,7 @@ class Clients:
         return key, self._sessions[key]
 
     def _leave(self, key: str, keep: bool) -> None:
-        """A client is out of reach, and may come back if it is kept."""
+        """Suspend the session of a disconnected client; end it unless ``keep``."""
         del self._sockets[key]
         if not keep:
             self._sessions.pop(key).close()
@@ -218,7 +218,7 @@ class Clients:
 
 
 async def _closed(socket: WebSocket) -> None:
-    with contextlib.suppress(RuntimeError):  # it is closed already
+    with contextlib.suppress(RuntimeError):  # already closed
         await socket.close(TOO_MANY, "this client came back by another connection")
 
 
@@ -234,7 +234,10 @@ async def _sent(socket: WebSocket, outbox: Outbox, there: asyncio.Event) -> None
 
 
 async def _received(socket: WebSocket, session: Session) -> bool:
-    """Hand on what a client says until it goes, or says what no client of ours does; whether it may come back."""
+    """Pass messages to the session until the client disconnects; return whether it may come back.
+
+    An invalid message ends the connection for good.
+    """
     from starlette.websockets import WebSocketDisconnect
 
     while True:
@@ -253,9 +256,9 @@ def application(offered: Offered, door: Door, files: Mapping[str, bytes]) -> Sta
     """The pages and the WebSocket of a bench, as an ASGI application.
 
     Args:
-        offered: what there is.
-        door: who may come in.
-        files: what is served, by name, ``index.html`` among them; nothing else is.
+        offered: the light fields, cameras and files of the bench.
+        door: access control.
+        files: the files to serve, by name, including ``index.html``; no other file is served.
 
     Raises:
         InputError: Starlette is not installed.
@@ -287,7 +290,7 @@ def application(offered: Offered, door: Door, files: Mapping[str, bytes]) -> Sta
 
 
 def static_files() -> dict[str, bytes]:
-    """The files of the front end, by name: all that is ever served. None in a copy without a front end."""
+    """The files of the front end, by name: no other file is served. Empty if the front end is not installed."""
     folder = resources.files("vcc.bench") / STATIC
     if not folder.is_dir():
         return {}
@@ -299,13 +302,14 @@ def static_files() -> dict[str, bytes]:
 
 
 def listening(host: str, port: int) -> socket.socket:
-    """A socket that listens; at a free port where port is 0.
+    """A listening socket; port 0 selects a free port.
 
     Raises:
-        InputError: the port is taken, or there is no such address.
+        InputError: the port is in use, or the address does not exist.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    # Named as TCP, so that asyncio sends at once: else a picture waits 40 ms until the state is acknowledged.
+    # IPPROTO_TCP is explicit, so that asyncio sets TCP_NODELAY: otherwise an image waits 40 ms for the
+    # acknowledgement of the state message.
     made = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -325,19 +329,19 @@ def run(
     """Serve a bench until Ctrl-C.
 
     Args:
-        offered: what there is.
-        host: the address to listen at: that of this machine alone, or one that others reach, who then need the
-            token in the address that is told.
+        offered: the light fields, cameras and files of the bench.
+        host: the address to listen on: the loopback address, or one that other machines reach. Other machines
+            need the token in the printed address.
         port: 0 for a free one.
-        browser: whether to open one.
-        say: tells the address.
+        browser: whether to open a browser.
+        say: prints the address.
 
     Raises:
-        InputError: the package is not installed, or the address is taken.
+        InputError: a package is not installed, or the port is in use.
     """
     with checks.package("the bench in a browser", "uvicorn", "bench"):
         import uvicorn
-        import websockets  # noqa: F401  # by which uvicorn speaks to browsers
+        import websockets  # noqa: F401  # used by uvicorn
     door = Door.of(host)
     app = application(offered, door, static_files())
     with listening(host, port) as made:
@@ -360,7 +364,7 @@ def run(
 
 
 def _server(uvicorn: Any, config: Any) -> Any:
-    """A server that ends at the first Ctrl-C, whoever is still there."""
+    """A uvicorn server that stops at the first Ctrl-C, even with clients connected."""
 
     class Server(uvicorn.Server):  # type: ignore[misc]
         interrupted = False
@@ -381,7 +385,7 @@ def _server(uvicorn: Any, config: Any) -> Any:
 
 
 def address_of(door: Door, port: int) -> str:
-    """What to open in a browser; the token stands where it is not sent to others."""
+    """The URL to open, with the token in its query if there is one."""
     host = f"[{door.host}]" if ":" in door.host else door.host
     if door.host in ("0.0.0.0", "::"):
         host = socket.gethostname()

@@ -1,8 +1,9 @@
-"""One client of a bench: what it says, what is done, what it is told. Nothing here knows how messages travel.
+"""The session of one client of a bench: receives its messages, does the work and sends the replies.
 
-Messages come in from any thread and are worked on by one of the session's own, in order; of what moves only the
-newest counts. A picture that is no longer wanted is broken off. The thread is there while there is work: a
-notebook keeps each bench that a cell ever made.
+This module is independent of the transport. Messages arrive from any thread. The session's own thread handles
+them in order; of the messages of a drag, only the newest counts. Making an image stops if the image is no
+longer needed. The thread exists only while there is work, because a notebook keeps each bench that a cell
+ever created.
 """
 
 from __future__ import annotations
@@ -56,41 +57,41 @@ from vcc.plot.fans import focused_distance
 
 Json = dict[str, Any]
 Send = Callable[[Json, Sequence[bytes]], None]
-"""Tells the client a message with its buffers; from any thread."""
+"""Sends the client a message with its buffers; called from any thread."""
 
 MOST_WAITING = 200
-"""Messages that may wait: who sends more is not listened to any longer."""
+"""Messages that may wait; a client that sends more is disconnected."""
 LINGER = 2.0
-"""Seconds that the thread waits for more."""
+"""Seconds that the thread waits for more work before it ends."""
 PAUSE = 0.1
-"""Seconds without anything to do after which pictures are rehearsed."""
+"""Seconds of idleness after which images are rehearsed."""
 SLOW = 0.4
-"""Seconds from which on a whole picture is shown coarsely first."""
+"""Expected time, seconds, above which a coarse image is shown before the whole one."""
 
 CHANGES = ("hello", "set", "upload", "add", "remove", "duplicate", "reorder", "undo", "redo", "load", "focus")
-"""What a client may do that shows another picture."""
+"""Messages that change the image."""
 QUESTIONS = ("pin", "value", "ask", "export")
-"""What it may do beside."""
+"""Messages that leave the image as it is."""
 
 log = logging.getLogger("vcc.bench")
 
 
 class Broken(Exception):
-    """A message that no client of ours sends: who sent it is not listened to any longer."""
+    """A message that the front end never sends; the client is disconnected."""
 
 
 class Superseded(Exception):
-    """What is being made is no longer wanted."""
+    """Raised to stop work whose result is no longer needed."""
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """A picture that is to be made.
+    """An image to be made.
 
     Args:
-        turn: the client's number of what asked for it.
-        moving: whether something moves.
-        coarse_shown: whether a coarse one was made of it already.
+        turn: the client's number of the message that requested it.
+        moving: whether it belongs to a drag.
+        coarse_shown: whether its coarse version was shown already.
     """
 
     turn: int
@@ -99,11 +100,11 @@ class Wanted:
 
 
 class Session:
-    """A client of a bench.
+    """The session of one client of a bench.
 
     Args:
-        offered: what there is.
-        send: tells the client.
+        offered: the light fields, cameras and files that the bench was started with.
+        send: sends a message to the client.
 
     Attributes:
         offered: as given.
@@ -129,18 +130,18 @@ class Session:
 
     @property
     def document(self) -> Document:
-        """What is shown."""
+        """The document shown now."""
         return self._history.present
 
     def receive(self, message: object, buffers: Sequence[bytes] = ()) -> None:
-        """Take note of a message; what follows comes by ``send``.
+        """Queue a message; replies come through ``send``.
 
         Args:
-            message: as JSON has it.
-            buffers: that came with it.
+            message: decoded JSON.
+            buffers: the binary buffers of the message.
 
         Raises:
-            Broken: it is none, or too many wait.
+            Broken: not a message of a bench, or too many messages wait.
         """
         checked = _checked(message)
         with self._changed:
@@ -154,27 +155,27 @@ class Session:
             self._wake()
 
     def pause(self) -> None:
-        """The client is out of reach: what is being made is broken off, and what is known of it stays."""
+        """Suspend: the client is unreachable. Work stops; the state is kept."""
         with self._changed:
             self._send = None
             self._inbox.clear()
             self._changed.notify()
 
     def go_on(self, send: Send) -> None:
-        """The client is there again, or by another way: it is told by this one from now on."""
+        """Resume: the client is reachable again. Messages go through this ``send`` from now on."""
         with self._changed:
             self._send = send
             self._wake()
 
     def close(self) -> None:
-        """End: what is being made is broken off, and nothing is sent any longer."""
+        """End the session: work stops, and nothing more is sent."""
         with self._changed:
             self._closed = True
             self._inbox.clear()
             self._changed.notify()
 
     def join(self, timeout: float | None = None) -> bool:
-        """Wait until the session's thread has ended; whether it has."""
+        """Wait until the session's thread has ended; return whether it has."""
         thread = self._thread
         if thread is None:
             return True
@@ -184,7 +185,7 @@ class Session:
     # --- the thread ---
 
     def _wake(self) -> None:
-        """Have it work on what there is; called with the lock held."""
+        """Notify the thread, and start it if needed; call with the lock held."""
         self._changed.notify()
         if self._thread is None and self._has_to_do():
             self._thread = threading.Thread(target=self._work, name="vcc bench", daemon=True)
@@ -210,7 +211,7 @@ class Session:
                     self._answer(message, buffers)
             except Superseded:
                 continue
-            except Exception as error:  # a fault of ours; the client is told, and the bench goes on
+            except Exception as error:  # a bug: the client is notified, and the bench goes on
                 log.exception("a fault on the bench")
                 self._wanted = None
                 self._tell({"is": "failed", "words": f"a fault in the program: {type(error).__name__}: {error}"})
@@ -219,7 +220,7 @@ class Session:
         return self._closed or bool(self._inbox) or (self._wanted is not None and self._send is not None)
 
     def _next(self) -> tuple[Json | None, list[bytes]]:
-        """The next message; none where a picture is to be made first."""
+        """Pop the next message; None if an image must be made first."""
         if not self._inbox or (self._wanted and _after_picture([message for message, _ in self._inbox])):
             return None, []
         return self._inbox.popleft()
@@ -240,7 +241,7 @@ class Session:
             self._refuse(message, _in_words(error))
         except Superseded:
             if message.get("what") in decoded.QUESTIONS:
-                return  # who looks at it asks again, of what is there then
+                return  # the client asks again, about the state at that time
             self._refuse(message, InputError(f"{doing} was broken off: something else was asked for meanwhile"))
 
     def _refuse(self, message: Json, error: InputError) -> None:
@@ -248,10 +249,10 @@ class Session:
         self._tell({"is": "refused", "do": message["do"], "words": str(error), "where": where, "turn": turn})
 
     def _check_wanted(self) -> None:
-        """Break off what is being made where another picture is asked for, or nobody is there to see it.
+        """Raise `Superseded` if another image is requested meanwhile, or the client is gone.
 
-        While something moves its next place waits for the picture of this one, which is made to be quick: else who
-        moves faster than pictures are made would see none.
+        During a drag, each image is finished before the next starts: images made during a drag are quick, and
+        if each new message stopped the work, a fast drag would show no image at all.
         """
         moving = self._wanted is not None and self._wanted.moving
         waiting = [message for message, _ in list(self._inbox) if message["do"] in CHANGES]
@@ -279,7 +280,7 @@ class Session:
         self._wanted = Wanted(_turn(message), moving=False)
 
     def _greet_with(self, message: Json) -> None:
-        """Begin with the document that a client brings; or go on with it, where it was there before."""
+        """Start with the document that the client sends; a client that reconnects adds it to its history."""
         given = message.get("document")
         if given is None:
             return
@@ -328,7 +329,7 @@ class Session:
         self._show(replace(present, camera={**present.camera, "elements": elements}), message)
 
     def _do_reorder(self, message: Json) -> None:
-        """Trade places along the axis with what light meets before (−1) or behind (1)."""
+        """Swap positions along the axis with the neighbour before (−1) or behind (1)."""
         number, by = self._element(message), message.get("by")
         elements = self._described.elements
         if by not in (-1, 1):
@@ -381,14 +382,14 @@ class Session:
         self._show(self._history.present.changed(["sensor", "z"], value), message)
 
     def _show(self, document: Document, message: Json, moving: bool = False) -> None:
-        """Show another document, if it is one."""
+        """Validate another document and show it."""
         document, self._described = self._checked(document)
         self._history.put(document, moving)
         self._tell_state(_turn(message))
         self._wanted = Wanted(_turn(message), moving)
 
     def _show_again(self, message: Json) -> None:
-        """Show what history gives, which was shown before."""
+        """Show the document that the history points to, which is valid already."""
         self._described = self._history.present.train(self.offered.beside)
         self._tell_state(_turn(message))
         self._wanted = Wanted(_turn(message), moving=False)
@@ -422,12 +423,12 @@ class Session:
 
     @property
     def _grid(self) -> Grid | None:
-        """Of the whole light field, as it stands before the camera; None until it is open."""
+        """The grid of the whole light field in its place before the camera; None until it is open."""
         document = self._history.present
         field = self.offered.field(document.light_field)
         return field.whole().grid.moved(document.aperture.rays) if field.is_open else None
 
-    # --- what is told ---
+    # --- messages to the client ---
 
     def _tell_state(self, turn: int) -> None:
         document = self._history.present
@@ -485,9 +486,10 @@ class Session:
             self._tell({"is": "notes", "turn": wanted.turn, "notes": self._notes(taken)})
 
     def _kinds(self, described: TrainAsWritten | None = None) -> Hashable:
-        """What tells cameras apart whose pictures take about as long; None takes the present one.
+        """The key under which image times are remembered; None uses the present camera.
 
-        Where nothing of the scene is sharp, the gaps between views are filled, which takes several times as long.
+        Cameras with equal keys take about the same time. Whether part of the scene is in focus is in the key:
+        otherwise views are interpolated, which takes several times as long.
         """
         described, grid = described or self._described, self._grid
         scene = () if grid is None else scene_distances(grid).values()
@@ -496,13 +498,14 @@ class Session:
         return self._history.present.light_field, sharp, *(element.kind for element in described.elements)
 
     def _is_rehearsed(self) -> bool:
-        """Whether nothing is left to be rehearsed: all is, or nobody sees a whole picture."""
+        """Whether nothing is left to rehearse, or rehearsing is useless because no whole image is shown."""
         return self._send is None or self._taken is None or self._taken.coarse or self._kinds() in self._rehearsed
 
     def _rehearse(self) -> None:
-        """Make what the first places of a drag would wait for: coarser light fields, compiled code, the pace.
+        """Prepare the first frames of a drag: coarser light fields, compiled code, timings.
 
-        By rays a whole picture has compiled all already, and what is out of focus is made as all else is.
+        If the image is made by rays, the whole image has compiled all code already, and images out of focus
+        are made in the same way.
         """
         self._rehearsed.add(self._kinds())
         by_rays = self._taken is not None and self._taken.plan.by_rays
@@ -520,7 +523,7 @@ class Session:
     def _take(
         self, fineness: Fineness, document: Document | None = None, described: TrainAsWritten | None = None
     ) -> Taken:
-        """The picture of a document; None takes the present one."""
+        """The image of a document; None uses the present one."""
         document, described = document or self._history.present, described or self._described
         field = self.offered.field(document.light_field)
         waited = 0.0
@@ -537,7 +540,7 @@ class Session:
 
     @contextmanager
     def _all_cores(self) -> Iterator[Progress]:
-        """The turn of one who keeps all cores at work, and what it says how far it is to."""
+        """Hold the turn for work that uses all cores; yield its progress callback."""
         with self.offered.turn.held(self._check_wanted) as let_pass:
 
             def progress(done: int, total: int) -> None:
@@ -573,7 +576,7 @@ class Session:
         self._tell(message, [jpeg(taken.values, white, taken.coarse or wanted.moving)])
 
     def _notes(self, taken: Taken) -> list[Json]:
-        """What to beware of, each at the element that its words name."""
+        """The warnings to show, each with the element that its text names."""
         train, field = self._described.train, self._light_field()
         said = [*taken.plan.cautions, *Cautions(train, field.grid).of(taken.plan, field, taken.found)]
         far_near = vergences(field.grid, None)
@@ -594,7 +597,7 @@ class Session:
         return self._taken
 
     def _whole_picture(self) -> Taken:
-        """The whole picture of the document, made if only a coarse one is there."""
+        """The whole image of the document; made now if only a coarse one exists."""
         taken = self._picture_there()
         if taken.coarse:
             taken = self._take(WHOLE)
@@ -641,7 +644,7 @@ class Session:
         self._tell({"is": "answer", "what": what, **answer}, buffers)
 
     def _asked(self) -> decoded.Asked:
-        """What is there to be decoded."""
+        """The input of decoding."""
         document, train = self._history.present, self._described.train
         return decoded.Asked(
             train,
@@ -664,7 +667,7 @@ class Session:
         self._tell({"is": "file", "name": name, "type": kind}, [data])
 
     def _export_film(self, sweep: Sweep, message: Json) -> None:
-        """A film of a sweep: each picture whole, all with the white of the present one."""
+        """Make a film of a sweep: whole images, all with the white level of the present one."""
         self._whole_picture()
         frames, words = [], "Making the film"
         for number, document in enumerate(sweep.documents):
@@ -678,7 +681,7 @@ class Session:
 
 
 def _checked(message: object) -> Json:
-    """A message that is one."""
+    """The message, validated."""
     if not isinstance(message, dict) or message.get("do") not in (*CHANGES, *QUESTIONS):
         raise Broken(f"no message of a bench: {shown(message)}")
     if type(message.get("turn", 0)) is not int or not -(2**53) < message.get("turn", 0) < 2**53:
@@ -687,7 +690,7 @@ def _checked(message: object) -> Json:
 
 
 def _in_words(error: InputError | MemoryError) -> InputError:
-    """What is refused; memory that is not enough is no fault of the program's."""
+    """The error to show; lack of memory is reported as an input error, not as a bug."""
     if isinstance(error, InputError):
         return error
     return InputError(
@@ -701,7 +704,7 @@ def _turn(message: Json) -> int:
 
 
 def _replaces(newer: Json, older: Json) -> bool:
-    """Whether a message makes the one before it needless: the same thing has moved on."""
+    """Whether a message makes the one before it obsolete: a newer value of the same parameter or question."""
     same = newer["do"] == older["do"]
     if same and newer["do"] == "set":
         return bool(older.get("moving")) and json.dumps(newer.get("where")) == json.dumps(older.get("where"))
@@ -711,6 +714,6 @@ def _replaces(newer: Json, older: Json) -> bool:
 
 
 def _after_picture(waiting: Sequence[Json]) -> bool:
-    """Whether the first of some messages is about the picture that is to be made, which is still wanted."""
+    """Whether the first waiting message asks about the image to be made, and that image is still needed."""
     superseded = any(message["do"] in CHANGES for message in waiting)
     return not superseded and waiting[0].get("what") in decoded.QUESTIONS

@@ -1,7 +1,7 @@
-"""What the side view of a bench shows, as data: elements in their places, rays through them, distances in words.
+"""The side view of a bench as data: elements in their places, rays through them, distances as text.
 
-It is what `vcc.plot.plot_camera` draws, traced and measured by the same functions. Lengths are metres, heights go
-upwards in the drawing as they go right in the scene. What is infinite is None: JSON has no infinity.
+The content is that of `vcc.plot.plot_camera`, traced and measured by the same functions. Lengths are metres.
+Upwards in the drawing is to the right in the scene. Infinity becomes None, because JSON has no infinity.
 """
 
 from __future__ import annotations
@@ -49,16 +49,16 @@ Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 AXIS = 0
-"""x is drawn upwards."""
+"""x points upwards in the drawing."""
 DIGITS = 5
-"""Of lengths that are drawn: a thousandth of a pixel."""
+"""Significant digits of lengths: a thousandth of a pixel."""
 FARTHEST_DRAWN = 4
-"""Lengths of the camera that the light field's aperture may stand before it to be in the drawing."""
+"""How far before the camera, in camera lengths, the drawing still includes the light field's aperture."""
 PROFILE_POINTS = 160
 MOST_PIECES = 400
-"""Of a mask's pattern: of a finer one, pieces are the mean of several."""
+"""Pieces of a mask's pattern; the pieces of a finer pattern are averaged."""
 AS_SHARP = 0.01
-"""Of 1/Z: what is no farther from the distance in focus shows no other rays."""
+"""Relative tolerance in 1/Z: a scene end this near to the distance in focus gets no rays of its own."""
 
 
 def side(
@@ -71,11 +71,11 @@ def side(
     """The side view of a camera.
 
     Args:
-        elements: of the camera, in the order by which they are called.
-        train: of them.
-        light_field: whose width the rays fill; None fills the first lens.
-        grid: whose scene tells what distances matter; None for none.
-        aperture: of the light field, as `vcc.bench.aperture.drawn_aperture` has it.
+        elements: of the camera, in the order of the document.
+        train: of these elements.
+        light_field: the rays fill its width; None fills the first lens.
+        grid: its scene gives the distances to show; None for no scene.
+        aperture: of the light field, from `vcc.bench.aperture.drawn_aperture`.
     """
     points = _points(train, grid)
     start = -scene_length(train, points)
@@ -119,7 +119,7 @@ def side(
 
 
 def _element(number: int, element: Element, span: Span, paths: Sequence[Paths]) -> Json:
-    """What an element is drawn as, how large, and what it lets through."""
+    """The shape of an element in the drawing, its size and its openings."""
     planes = crossings(element)
     size = half_size(element, AXIS)
     centre = element.decentre[AXIS]
@@ -148,13 +148,13 @@ def _element(number: int, element: Element, span: Span, paths: Sequence[Paths]) 
 
 
 def _opening(element: Element, half: float) -> Json:
-    """What is open of an element with a rim: from where to where, on the drawing."""
+    """The opening of an element with a rim: its ends on the drawing."""
     centre = element.decentre[AXIS]
     return {"openings": [[element.z, centre - half, centre + half]] if math.isfinite(half) else []}
 
 
 def _by_faces(element: Element, faces: Faces, span: Span) -> Json:
-    """Any thin element by what it does: glass where it bends, frosted where it scatters, a bar of shades."""
+    """Any thin element by its function: glass that deflects, frosted if it scatters, grey levels of a mask."""
     found: Json = {"drawn": "sheet"} | _opening(element, half_opening(faces, AXIS))
     if faces.pattern is not None:
         scale = magnification(element, faces, AXIS, span.low, span.high)
@@ -171,7 +171,7 @@ def _by_faces(element: Element, faces: Faces, span: Span) -> Json:
         profile = glass_profile(span, element, faces)
         if profile is not None:
             height, depth = profile
-            cells = isinstance(faces.bending, CellDeflection)  # whose borders are to stay sharp
+            cells = isinstance(faces.bending, CellDeflection)  # keep the borders of cells sharp
             every = 1 if cells else max(len(height) // PROFILE_POINTS, 1)
             points = _pairs(height[::every] + element.decentre[AXIS], depth[::every])
             found |= {"drawn": "glass", "profile": points}
@@ -179,7 +179,7 @@ def _by_faces(element: Element, faces: Faces, span: Span) -> Json:
 
 
 def _pieces(edges: Array, values: Array) -> list[list[float]]:
-    """[from, to, share of light] of each piece of a mask, no more than `MOST_PIECES`."""
+    """[from, to, transmission] of each piece of a mask, at most `MOST_PIECES`."""
     if len(values) > MOST_PIECES:
         wanted = np.linspace(edges[0], edges[-1], MOST_PIECES + 1)
         through = np.concatenate([[0.0], np.cumsum(values * np.diff(edges))])
@@ -204,7 +204,7 @@ def _sensor_label(train: Train) -> list[str]:
 
 
 def _points(train: Train, grid: Grid | None) -> list[Point]:
-    """The points whose rays are drawn: in focus, also off the axis, and the scene's ends if they are known."""
+    """The points whose rays are drawn: in focus, also off the axis, and the scene's ends if known."""
     found = points_to_show(train, None, AXIS)
     scene = {} if grid is None else scene_distances(grid)
     apart = {
@@ -223,7 +223,7 @@ def _away(distance: float) -> str:
 
 
 def _rays(point: Point, paths: Paths) -> Json:
-    """The fan from a point: each ray as places [z, height, share of light left on the way there]."""
+    """The fan of rays from a point: each ray as a list of [z, height, share of light left]."""
     listed = []
     for height, share, first in zip(paths.positions[..., AXIS], paths.shares, paths.starts, strict=True):
         ray = []
@@ -240,7 +240,7 @@ def _distance(distance: float | None) -> float | None:
 
 
 def _short(length: float) -> float:
-    """A length for a drawing: what JSON holds of it is no longer than what is seen."""
+    """A length rounded to what a drawing can show, so that its JSON is short."""
     return float(f"{length:.{DIGITS}g}")
 
 
@@ -248,7 +248,7 @@ def _short(length: float) -> float:
 
 
 def scene_distances(grid: Grid) -> dict[str, float]:
-    """Distances of a light field's scene that matter, metres, by name: its ends, as far as they are known."""
+    """Distances of the nearest and farthest parts of the scene, metres, by name; empty if unknown."""
     found = grid.measured_disparity_range()
     if found is None:
         return {}
@@ -257,7 +257,7 @@ def scene_distances(grid: Grid) -> dict[str, float]:
 
 
 def _words(train: Train, focus: float | None, grid: Grid | None) -> list[str]:
-    """What is sharp, how long the camera is, and its first lenses' openings."""
+    """Sentences on what is in focus, the scene, the sensor's distance and the f-number of the first lens."""
     sharp = "Nothing real is sharp on the sensor" if focus is None else f"Sharp: {distance_in_words(focus)}"
     said = [f"{sharp}."]
     if grid is not None and (scene := scene_distances(grid)):

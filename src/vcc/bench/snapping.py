@@ -1,4 +1,4 @@
-"""Where on the axis a part would have to stand for what matters in the scene to be sharp."""
+"""Positions on the axis at which a part brings given distances of the scene into focus."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ Array = NDArray[np.float64]
 Json = dict[str, Any]
 
 ALIKE = 1e-6
-"""Share of the beam by which rays may miss one another: rounding leaves less, astigmatism more."""
+"""Tolerance on where rays meet, as a share of the beam: rounding errors are smaller, astigmatism is larger."""
 APART = 1e-3
-"""Distances that differ by a smaller share are told once."""
+"""Relative difference below which distances count as equal."""
 NOTHING = np.eye(4)
-"""What is done to rays (u, v, s, t) by what does not bend them."""
+"""The matrix on rays (u, v, s, t) of an element that does not bend them."""
 STEP = Affine.propagation(1.0).linear - NOTHING
-"""What a flight of 1 m adds to them."""
+"""The change of rays over a flight of 1 m, added to `NOTHING`."""
 
 
 def snaps_of_sensor(train: Train, distances: Mapping[str, float]) -> list[Json]:
-    """Where the sensor would have to stand, nearest the scene first: z in metres, and words.
+    """Positions of the sensor that bring distances into focus, nearest the scene first: z in metres, and text.
 
     Args:
         train: the camera.
-        distances: before the entrance plane, metres, by what stands there.
+        distances: before the entrance plane, metres, by the name of the object there.
     """
     snaps = []
     for name, distance in distances.items():
         try:
             z = focused_train(train.elements, train.sensor, distance).sensor.z
-        except InputError:  # of that distance there is no image
+        except InputError:  # this distance has no image
             continue
         snaps.append(_snap(z, name, distance))
     return _in_order(snaps)
@@ -50,17 +50,17 @@ def snaps_of_sensor(train: Train, distances: Mapping[str, float]) -> list[Json]:
 def snaps_of_elements(
     elements: Sequence[Element], train: Train, distances: Mapping[str, float]
 ) -> list[list[Json]]:
-    """Where each element that bends light affinely would have to stand, all else as it is; as for the sensor.
+    """Positions of each affine element that bring distances into focus, all else fixed; format as for the sensor.
 
-    With the element a behind the one before it, the rays of a point at Z meet on the sensor where A(a) + B(a)/Z is
-    0, and both are quadratic in a: a thin lens between a point and a sensor T apart has Bessel's two conjugate
-    places where T > 4·f, and none where T < 4·f. What bends rays otherwise (lens arrays, plates) and what scatters
-    them is passed over; before an array of lenslets, what counts is the plane that it looks at.
+    With the element a behind the one before it, the rays of a point at Z meet on the sensor if A(a) + B(a)/Z
+    = 0. Both are quadratic in a: a thin lens between a point and a sensor T apart has Bessel's two conjugate
+    positions if T > 4·f, and none if T < 4·f. Elements that bend rays non-affinely (lens arrays, plates) or
+    scatter them get none. Before an array of lenslets, the target is the plane that the lenslets image.
 
     Args:
-        elements: those of the camera that are asked for, in the order of the answer.
+        elements: the elements of the camera to evaluate, in the order of the result.
         train: the camera.
-        distances: before the entrance plane, metres, by what stands there.
+        distances: before the entrance plane, metres, by the name of the object there.
     """
     asked = [(name, distance) for name, distance in distances.items() if distance > 0]
     (stop, beyond), powers = plane_to_focus(train), {id(one): _power(one) for one in train.elements}
@@ -81,7 +81,7 @@ def snaps_of_elements(
 
 
 def _power(element: Element) -> Array:
-    """What an element does to rays about its own middle, (4, 4)."""
+    """The ray matrix of an element about its own middle, (4, 4)."""
     found = NOTHING
     for part in element.parts():
         step = part if isinstance(part, Affine) else part.affine
@@ -90,7 +90,7 @@ def _power(element: Element) -> Array:
 
 
 def _before_and_behind(powers: Sequence[Array], gaps: Array, beyond: float) -> tuple[Array, Array]:
-    """Of each gap: the way of rays from the entrance to its begin, and from its end to the plane in focus."""
+    """For each gap, the ray matrices from the entrance to its start, and from its end to the plane in focus."""
     flights = NOTHING + gaps[:, None, None] * STEP
     before, behind = [NOTHING], [NOTHING + beyond * STEP]
     for power, flight in zip(powers, flights[:-1], strict=True):
@@ -101,14 +101,14 @@ def _before_and_behind(powers: Sequence[Array], gaps: Array, beyond: float) -> t
 
 
 def _inside(power: Array, rooms: Array) -> Array:
-    """Through gaps with the element a behind their begin, as coefficients of 1, a and a², (gaps, 3, 4, 4)."""
+    """Matrices through gaps with the element a behind their start: coefficients of 1, a, a², (gaps, 3, 4, 4)."""
     leaving = (NOTHING + rooms[:, None, None] * STEP) @ power
     square = np.broadcast_to(-STEP @ power @ STEP, leaving.shape)
     return np.stack([leaving, leaving @ STEP - STEP @ power, square], axis=1)
 
 
 def _sharp(ways: Array, rooms: Array, distances: Array) -> list[tuple[int, int, float]]:
-    """(gap, number of the distance, a) wherever all rays of a point on the axis meet in the plane in focus."""
+    """(gap, index of the distance, a) where all rays of a point on the axis meet in the plane in focus."""
     near = 1 / distances[:, None, None, None]
     beam = ways[:, None, :, :2, :2] + ways[:, None, :, :2, 2:] * near  # (gaps, distances, 3, 2, 2)
     size = np.abs(ways[:, None, :, :2, :2]) + np.abs(ways[:, None, :, :2, 2:]) * near
@@ -136,7 +136,7 @@ def _in_order(snaps: list[Json]) -> list[Json]:
 
 
 def without_repeats(distances: Mapping[str, float]) -> dict[str, float]:
-    """Distances, metres by name, without those that another one before them says already."""
+    """Distances, metres by name, without those that repeat an earlier one."""
     found: dict[str, float] = {}
     for name, distance in distances.items():
         if not any(_near(distance, other) for other in found.values()):

@@ -1,4 +1,4 @@
-"""A parameter that goes from one value to another, and the film of it."""
+"""A sweep of one parameter between two values, as a film."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from vcc.formats.films import Film
 FRAMES, FRAMES_PER_SECOND = 30, 12
 MOST_FRAMES = 200
 MOST_PIXELS = 2**26
-"""Of all frames together: what is kept until the film is written takes three bytes for each."""
+"""Pixels of all frames together: three bytes each are kept until the film is written."""
 TYPES = {".gif": "image/gif", ".mp4": "video/mp4"}
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A parameter on its way.
+    """The frames of a sweep.
 
     Args:
-        documents: with each of its values.
+        documents: one for each value.
         writer: of the film.
-        there_and_back: whether the frames follow in reverse order, too.
+        there_and_back: whether the frames are repeated in reverse order.
     """
 
     documents: tuple[Document, ...]
@@ -39,14 +39,14 @@ class Sweep:
 
     @property
     def frames(self) -> int:
-        """How many pictures are made."""
+        """The number of images to make."""
         return len(self.documents)
 
     def film(self, frames: Sequence[NDArray[np.uint8]]) -> tuple[str, str, bytes]:
-        """The film of pictures, grey or in colour: its name, its type and its bytes.
+        """The film of 8-bit images, grey or in colour: its name, its media type and its bytes.
 
         Raises:
-            InputError: no PyAV for an MP4.
+            InputError: PyAV is missing, which MP4 requires.
         """
         back = list(frames[-2:0:-1]) if self.there_and_back else []
         ending = self.writer.ending
@@ -58,15 +58,15 @@ class Sweep:
 
 
 def sweep_of(message: dict[str, Any], document: Document) -> Sweep:
-    """What a client asks to be filmed.
+    """The sweep that a client requests.
 
     Args:
-        message: with ``where``, the path of a parameter, ``from`` and ``to``, numbers or quantities in words;
+        message: with ``where``, the path of a parameter, ``from`` and ``to``, numbers or quantities as text;
             ``frames``, ``format``, ``frames_per_second`` and ``there_and_back``.
-        document: in which the parameter goes.
+        document: the state in which the parameter varies.
 
     Raises:
-        InputError: what is none of these, or too long.
+        InputError: a value is invalid, or the film is too large.
     """
     ending = f".{message.get('format', 'gif')}"
     if ending not in TYPES:
@@ -87,7 +87,7 @@ def sweep_of(message: dict[str, Any], document: Document) -> Sweep:
 
 
 def _between(first: Any, last: Any, count: int) -> list[Any]:
-    """Values in equal steps from the first to the last, in the form of these."""
+    """Values in equal steps from the first to the last, numbers or text as the ends are."""
     if type(first) in (int, float) and type(last) in (int, float):
         return [float(each) for each in np.linspace(first, last, count)]
     for dimension in units.SI_NAMES:

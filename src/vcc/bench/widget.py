@@ -1,4 +1,4 @@
-"""The bench in a notebook: the same front end, carried by anywidget (Jupyter, VS Code, marimo)."""
+"""The bench in a notebook: the same front end as an anywidget (Jupyter, VS Code, marimo)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vcc.light_field import LightField
 from vcc.optics.train import Train
 
 NAME = "light field"
-"""What the light field of a notebook is called on a bench."""
+"""Name of a notebook's light field on a bench."""
 
 
 def bench_of(camera: Train, light_field: LightField) -> Any:
@@ -42,10 +42,8 @@ _fields: WeakValueDictionary[int, Field] = WeakValueDictionary()
 
 
 def _field(light_field: LightField) -> Field:
-    """One for each light field, with its coarser copies: a cell that is run again does not make them again."""
-    found = _fields.get(
-        id(light_field)
-    )  # as long as a field is there, so is its light field, and its id is its own
+    """The `Field` of a light field, reused with its coarser copies if a cell runs again."""
+    found = _fields.get(id(light_field))  # a Field keeps its light field alive, so the id stays unique
     if found is None:
         found = _fields[id(light_field)] = Field(light_field)
     return found
@@ -53,7 +51,7 @@ def _field(light_field: LightField) -> Field:
 
 @functools.cache
 def _kind() -> Any:
-    """The class of the widget, made when there is anywidget to make it of."""
+    """The class of the widget, created on demand because it requires anywidget."""
     with checks.package("the bench in a notebook", "anywidget", "notebook"):
         import anywidget
 
@@ -61,7 +59,7 @@ def _kind() -> Any:
         """A camera on the optical bench, in a cell.
 
         Args:
-            offered: what there is.
+            offered: the inputs of the bench.
         """
 
         _esm = (resources.files("vcc.bench") / "static" / "bench.js").read_text(encoding="utf-8")
@@ -73,7 +71,7 @@ def _kind() -> Any:
 
         @property
         def camera(self) -> Camera:
-            """The camera as it now stands on the bench."""
+            """The camera as it is on the bench now."""
             train = self._session.document.train(self._session.offered.beside).train
             return Camera(train.elements, train.sensor)
 
@@ -81,7 +79,7 @@ def _kind() -> Any:
             return "The optical bench of a camera. It is drawn where Python runs: run this cell again."
 
         def close(self) -> None:
-            """End, and take the bench out of the notebook."""
+            """End the session, and remove the bench from the notebook."""
             self._session.close()
             super().close()
 

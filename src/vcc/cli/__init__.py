@@ -1,4 +1,4 @@
-"""The command line, ``vcc``: one command a file, loaded when it is asked for."""
+"""The command line, ``vcc``: one module per command, loaded on demand."""
 
 from vcc.cli.app import main
 

@@ -1,4 +1,4 @@
-"""The commands of ``vcc`` by name: what help says of each, and where it stands; running one, and how it ends."""
+"""The commands of ``vcc``: their help texts and modules; how a command runs and ends."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ COMMANDS = {
         "vcc gallery biprism-stereo --light-field views/ -o stereo",
     ),
 }
-"""By name: what help says, and examples. ``vcc NAME`` is the function of that name in ``vcc.cli.NAME``."""
+"""Help text and examples by name. ``vcc NAME`` is the function NAME in ``vcc.cli.NAME``."""
 
 RENDERERS = {
     "mitsuba": (
@@ -144,13 +144,13 @@ RENDERERS = {
         'vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"',
     ),
 }
-"""Likewise: ``vcc synth NAME`` is the function of that name in ``vcc.cli.synth.NAME``."""
+"""Likewise: ``vcc synth NAME`` is the function NAME in ``vcc.cli.synth.NAME``."""
 
 
 def _commands(
     name: str, package: str, commands: dict[str, tuple[str, ...]], help: str, epilogue: str, place: int = 0
 ) -> App:
-    """An app whose commands are loaded when they are asked for, and listed in the order given."""
+    """An app whose commands are loaded on demand and listed in the order given."""
     made = App(
         name=name,
         help=help,
@@ -177,7 +177,7 @@ def _commands(
 
 
 def _worth_showing(default: object) -> str | None:
-    """A default in help; that an option is not given goes without saying."""
+    """A default as help shows it; None and False are not shown."""
     return None if default is None or default is False else str(default)
 
 
@@ -207,21 +207,21 @@ app.register_install_completion_command(
 
 
 INTERRUPTED = 130
-"""What shells expect of a program that Ctrl-C ended."""
+"""The exit code that shells expect after Ctrl-C."""
 
 
 def main() -> None:
     """Run the command line with the arguments of this process, and end it with an exit code.
 
-    0: done. 1: a fault in the program, with a traceback. 2: unusable input, with a message on standard error.
-    130: interrupted by Ctrl-C.
+    0: done. 1: a bug, with a traceback. 2: invalid input, with a message on standard error. 130: interrupted
+    by Ctrl-C.
     """
     try:
         code = run(sys.argv[1:])
-    except KeyboardInterrupt:  # once more, while the first was being answered
+    except KeyboardInterrupt:  # a second Ctrl-C while the first was handled
         code = INTERRUPTED
     if code == INTERRUPTED and threading.active_count() > 1:
-        # What threads are at is no longer wanted, and Python would wait for it.
+        # The work of other threads is no longer needed, and Python would wait for it.
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
@@ -229,7 +229,7 @@ def main() -> None:
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Run a command; bad input becomes a message, and what is to be read with care a line.
+    """Run a command; print errors in the input and warnings about the result as lines on standard error.
 
     Args:
         arguments: as typed after ``vcc``.
@@ -247,7 +247,7 @@ def run(arguments: Sequence[str]) -> int:
         except KeyboardInterrupt as interrupt:
             say("Aborted.", "bold red", str(interrupt))
             return INTERRUPTED
-        except BrokenPipeError:  # who reads has seen enough; nothing more is to be written when Python ends
+        except BrokenPipeError:  # the reader closed the pipe; Python must not flush at exit
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 1
     return 0
@@ -261,13 +261,13 @@ def _refuse(message: str, way_out: str = "") -> int:
 
 
 def _in_words(error: CycloptsError) -> str:
-    """What is wrong with what was typed. What our converters refuse is said as they say it."""
+    """The message for an error in the arguments; messages of our converters are used unchanged."""
     if isinstance(error.__cause__, InputError):
         return str(error.__cause__)
     if isinstance(error, MissingArgumentError) and error.argument is not None and error.keyword is None:
         kind = "argument" if error.argument.index is not None else "option"
         return f"Missing {kind} {' / '.join(error.argument.names)}"
-    if isinstance(error, UnknownCommandError) and error.app is not None:  # its own words load every command
+    if isinstance(error, UnknownCommandError) and error.app is not None:  # its message loads all commands
         return _no_such_command((error.unused_tokens or [""])[0], [each for each in error.app if each[0] != "-"])
     if isinstance(error, UnusedCliTokensError):
         return f"Unexpected {' '.join(error.unused_tokens or [])}"

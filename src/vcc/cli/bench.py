@@ -38,11 +38,11 @@ def bench(
     """Open the optical bench in the browser: move elements and see the image change.
 
     Args:
-        host: The address to listen at. Anything but this machine's own lets others in, who then need the token in
-            the address that is printed.
-        port: The port to listen at; 0 takes a free one.
-        no_browser: Print the address, and open no browser.
-        gallery: Begin with a published camera of the gallery, such as plenoptic; vcc gallery lists their names.
+        host: The address to listen on. With any other than this machine's own, other machines can connect;
+            they need the token in the printed address.
+        port: The port to listen on; 0 selects a free one.
+        no_browser: Print the address without opening a browser.
+        gallery: Start with a published camera of the gallery, such as plenoptic; vcc gallery lists their names.
     """
     fields = scenes()
     name = SCENE
@@ -60,14 +60,14 @@ def bench(
     else:
         start, beside = _document(camera, name)
     offered = Offered(fields, start, beside, shown)
-    # While the browser starts; whoever looks first waits for the same.
+    # Opens while the browser starts; a client that is faster waits for the same lock.
     threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
     run(offered, host=host, port=port, browser=not no_browser, say=show)
 
 
 def _document(camera: Path, light_field: str) -> tuple[Document, Beside]:
-    """A camera file as what a bench shows, and the files beside it that it names: those alone may be read."""
-    load_camera(camera)  # which refuses it with its name
+    """The document of a camera file, and the files that it names: only these may be read."""
+    load_camera(camera)  # its errors contain the file's name
     file = camera.expanduser()
     tables, seen = read_tables(file), Beside(file.parent)
     train_of_tables(tables, seen)
@@ -90,4 +90,4 @@ def _opened(field: Field) -> None:
     try:
         field.whole()
     except InputError:
-        return  # who looks at it is told
+        return  # the client gets the message

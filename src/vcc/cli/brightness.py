@@ -1,4 +1,4 @@
-"""How bright a light field is: the range of its linear light."""
+"""The brightness of a light field: its range of linear light."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from vcc.files import transfer as curves
 
 _LOW, _HIGH = 0.1, 99.9  # per cent of the samples between which the dynamic range is measured
 MOST_SAMPLES = 4_000_000
-"""Of floating-point samples that are sorted for it."""
+"""Limit on the floating-point samples that are sorted for the range."""
 
 
 def brightness(views: Iterable[NDArray[Any]], transfer: str) -> str:
-    """The dynamic range of linear light, and how much of it is black or at the end of the scale, in words."""
+    """The dynamic range of linear light, and the share that is black or at the end of the scale, as text."""
     levels, counts = histogram(views, transfer)
     shares = np.cumsum(counts) / counts.sum()
     low, high = (float(levels[np.searchsorted(shares, share / 100)]) for share in (_LOW, _HIGH))
@@ -45,12 +45,12 @@ def _rounded(ratio: float) -> str:
 def histogram(
     views: Iterable[NDArray[Any]], transfer: str, most: int = MOST_SAMPLES
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Linear light that occurs, growing, and how often.
+    """The distinct levels of linear light, ascending, and their counts.
 
     Args:
         views: samples, one view at a time; at least one.
-        transfer: "srgb" or "linear": how integers stand for light.
-        most: floating-point samples that are sorted; of more, only some are seen.
+        transfer: "srgb" or "linear": the encoding of integers.
+        most: floating-point samples that are sorted; if there are more, a part of them is used.
     """
     counts: NDArray[np.float64] | None = None
     some: list[NDArray[Any]] = []

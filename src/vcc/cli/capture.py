@@ -1,4 +1,4 @@
-"""``vcc capture``: the picture that a camera records."""
+"""``vcc capture``: the image that a camera records."""
 
 from vcc.cli.console import check_output, progress, show
 from vcc.cli.executing import Executing
@@ -9,7 +9,7 @@ from vcc.motion import load_moving_camera
 from vcc.store import StoredVideo
 
 WORTH_A_BAR = 3e8
-"""Samples below which a picture takes less than a second, and asking for progress would only slow it down."""
+"""Samples below which an image takes less than a second, so that progress calls would only slow it down."""
 
 
 def capture(
@@ -29,9 +29,9 @@ def capture(
 
     Args:
         output: The image: .png, .tif and .jpg are for viewing (sRGB); .exr and .npy contain linear values.
-        exposure: Factor from irradiance to the brightness of a .png or .tif. auto shows the brightest parts white
-            and says which factor that took.
-        as_recorded: Leave the picture upside down, as it lies on the sensor.
+        exposure: Factor from irradiance to the brightness of a .png or .tif. auto shows the brightest parts
+            white and prints the factor.
+        as_recorded: Leave the image upside down, as on the sensor.
     """
     output = check_output(output, WRITE_ENDINGS)
     moving = load_moving_camera(camera)

@@ -1,4 +1,4 @@
-"""How commands speak: results on standard output; errors, notes and progress on standard error."""
+"""Output of commands: results on standard output; errors, notes and progress on standard error."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _PAIR = re.compile(r"\bviews=\((\w+), (\w+)\)")
 
 @contextmanager
 def notes() -> Iterator[None]:
-    """Warnings of ours become lines on standard error while this lasts."""
+    """Context in which this package's warnings become lines on standard error."""
     ours = (ResultWarning, CacheWarning)
     with warnings.catch_warnings():
         for each in ours:
@@ -43,7 +43,7 @@ def notes() -> Iterator[None]:
 
 
 def say(word: str, colour: str, message: str) -> None:
-    """A line on standard error, its first word in colour."""
+    """Print a line on standard error, its first word in colour."""
     from rich.console import Console
     from rich.text import Text
 
@@ -52,8 +52,9 @@ def say(word: str, colour: str, message: str) -> None:
 
 
 def as_options(message: str) -> str:
-    """A message of the library in the words of the command line: focus_distance=… is
-    ``--focus-distance …`` here, and lengths carry units.
+    """A message of the library with options in place of arguments.
+
+    focus_distance=… becomes ``--focus-distance …``, and lengths carry units.
     """
     message = message.replace("(lengths in metres)", '(lengths with a unit: "50 mm")')
     message = message.replace("focus_distance=… (metres)", 'focus_distance=… (a length: "1.2 m")')
@@ -68,18 +69,18 @@ def as_options(message: str) -> str:
 
 
 def show(message: str) -> None:
-    """Text on standard output as it is: no markup, no breaking of lines."""
+    """Print text on standard output unchanged: no markup, no line breaking."""
     print(message, flush=True)
 
 
 @contextmanager
 def progress(task: str) -> Iterator[Progress]:
-    """What to call while something long runs, yielded: it moves a bar on standard error, if people watch.
+    """A progress callback that moves a bar on standard error, if it is a terminal.
 
-    Where nobody does (a log, a job on a cluster), one line says how long it will take, if that is long.
+    Otherwise (a log, a job on a cluster) one line reports the estimated time, if it is long.
 
     Args:
-        task: what is being done, in a few words.
+        task: short name of the work.
     """
     from rich.console import Console
     from rich.progress import Progress as Bars
@@ -94,24 +95,24 @@ def progress(task: str) -> Iterator[Progress]:
 
 
 SOON, LONG = 5.0, 30.0
-"""Seconds of work after which its time is estimated, and from which on that is worth a line."""
+"""Seconds of work before the remaining time is estimated, and the least estimate that is printed."""
 
 
 class _Estimate:
-    """Progress that says once how long it will take, when that can be told and is long.
+    """Progress that prints the remaining time once, if it is long.
 
     Args:
-        task: what is being done, in a few words.
-        clock: seconds that go by.
+        task: short name of the work.
+        clock: a clock in seconds.
     """
 
     def __init__(self, task: str, clock: Callable[[], float] = time.monotonic) -> None:
         self._task, self._clock, self._told = task, clock, False
         self._began = clock()
-        self._before: int | None = None  # what was done already when work began
+        self._before: int | None = None  # done before this work began
 
     def __call__(self, done: int, total: int) -> None:
-        """Take note, and tell if it is time."""
+        """Record progress, and print the estimate when it is due."""
         if self._before is None:
             self._before = done if done > 1 else 0
         passed, made = self._clock() - self._began, done - self._before
@@ -123,7 +124,7 @@ class _Estimate:
 
 
 def _in_words(seconds: float) -> str:
-    """A time that is estimated, in two digits at most."""
+    """An estimated time as text, with two digits at most."""
     if seconds < 90:
         return f"{max(1, round(seconds / 10)) * 10} s"
     minutes = seconds / 60
@@ -131,26 +132,25 @@ def _in_words(seconds: float) -> str:
 
 
 DRAWINGS = (".png", ".svg", ".pdf")
-"""How names of drawings end."""
+"""File endings of drawings."""
 
 
 def save_figure(figure: Any, path: Path) -> None:
-    """Write a Matplotlib figure, and say so."""
+    """Write a Matplotlib figure, and print its path."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary)
     show(f"{path}: written")
 
 
 def check_output(path: Path, endings: tuple[str, ...]) -> Path:
-    """Refuse a file that cannot be written, before the work that it is for.
+    """Check that a file can be written, before the work starts.
 
     Args:
         path: the file.
-        endings: those that it may have.
+        endings: the supported endings.
 
     Raises:
-        InputError: another ending, a folder that does not exist or cannot be written to, or a path
-            that is a folder itself.
+        InputError: another ending, a folder that does not exist or is not writable, or a path that is a folder.
     """
     path = path.expanduser()
     if path.suffix.lower() not in endings:
@@ -166,7 +166,7 @@ def check_output(path: Path, endings: tuple[str, ...]) -> Path:
 
 
 def free_output(output: Path, overwrite: bool) -> Path:
-    """A path that may be written to, before the work that it is for."""
+    """The path of an output that does not exist yet or may be replaced, checked before the work starts."""
     output = output.expanduser()
     if not output.parent.is_dir():
         raise InputError(f"{output} cannot be written: there is no folder {output.parent}; make it first")
@@ -176,10 +176,10 @@ def free_output(output: Path, overwrite: bool) -> Path:
 
 
 def make_folder(path: Path) -> Path:
-    """A folder to write to, made if it is not there.
+    """A folder to write to, created if it does not exist.
 
     Raises:
-        InputError: it is a file, or cannot be made or written to.
+        InputError: it is a file, or cannot be created or written to.
     """
     path = path.expanduser()
     try:

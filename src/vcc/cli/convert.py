@@ -1,4 +1,4 @@
-"""``vcc convert``: a light field into a store, or into files of another format."""
+"""``vcc convert``: a light field to a store, or to files of another format."""
 
 from __future__ import annotations
 
@@ -47,13 +47,15 @@ class Storing:
     """How a store keeps samples.
 
     Args:
-        dtype: What samples are stored as: uint8 and uint16 as sRGB codes where they were not integers before,
-            float16 and float32 as linear light. Default: as they are, bit for bit.
-        compression: Lossless: zstd (the default) packs more, lz4 is faster.
-        level: Of lossless packing, 0 (fast) to 9 (small). Default: 3.
-        lossy: Keep each view as a picture, changed and smaller; how much it is changed is measured and said.
+        dtype: Type of the stored samples: uint8 and uint16 hold sRGB codes if the samples were not integers
+            before, float16 and float32 hold linear light. Default: as they are, bit for bit.
+        compression: Lossless: zstd (the default) compresses more, lz4 is faster.
+        level: Of lossless compression, 0 (fast) to 9 (small). Default: 3.
+        lossy: Store each view as a compressed picture, smaller but changed; the change is measured and
+            reported.
         quality: With --lossy, 1 (small) to 99 (fine). Default: 90.
-        chunks: Rows of pixels packed together: with fewer, parts of a view cost less to read. Default: 128 kB.
+        chunks: Rows of pixels compressed together: with fewer, reading part of a view costs less. Default:
+            128 kB.
     """
 
     dtype: Literal["uint8", "uint16", "float16", "float32"] | None = None
@@ -64,7 +66,7 @@ class Storing:
     chunks: Annotated[Whole | None, Parameter(metavar="ROWS")] = None
 
     def packing(self) -> Lossless | Lossy:
-        """What packs the samples.
+        """The compression of the samples.
 
         Raises:
             InputError: options of both kinds, or a level or quality out of range.
@@ -93,11 +95,11 @@ def convert(
     """Put a light field into a store (Zarr), or into files of another format.
 
     Args:
-        frame_rate: LIGHT_FIELD is a folder that holds a light field for each frame (frame_0001, frame_0002, …):
-            make a video of them, so many a second. The same command goes on with those that came since.
+        frame_rate: Frames per second: make a video from LIGHT_FIELD, a folder with one light field per frame
+            (frame_0001, frame_0002, …). The same command appends frames that were added since.
 
     Raises:
-        InputError: an output that is there, or what reading and writing refuse.
+        InputError: the output exists, or reading or writing fails.
     """
     if frame_rate is not None:
         if output.suffix.lower() != ".zarr" or kind or overwrite:
@@ -129,7 +131,7 @@ def convert(
 def _to_store(
     source: Path, output: Path, storing: Storing, packing: Lossless | Lossy, overwrite: bool, reading: Reading
 ) -> str:
-    """Convert a light field to a store; what came of it, in words."""
+    """Convert a light field to a store; return a summary as text."""
     field, transfer, assumed = _with_its_codes(source, reading)
     with progress("Writing views") as advance:
         made = convert_to_store(
@@ -147,7 +149,7 @@ def _to_store(
 
 
 def _to_video(source: Path, output: Path, storing: Storing, reading: Reading, rate: float) -> str:
-    """Append the light fields of a folder to a video, those that are not there yet; what came of it, in words."""
+    """Append the light fields of a folder that a video lacks to the video; return a summary as text."""
     frames, packing = numbered_frames(source), storing.packing()
     made = {
         "converted_from": source.expanduser().resolve().name,
@@ -168,16 +170,16 @@ def _to_video(source: Path, output: Path, storing: Storing, reading: Reading, ra
             )
             with kept as video, progress(f"Writing frame {number + 1} of {len(frames)}") as advance:
                 video.append(field, number / rate, progress=advance)
-            # What is assumed is assumed of all frames, and said once.
+            # The assumptions hold for all frames, and are reported once.
             warnings.filterwarnings("ignore", ".* do not state ", ResultWarning)
     return video_written(open_video(output), before)
 
 
 def _frames_of(output: Path, made: dict[str, Any]) -> int:
-    """How many frames are there of a video that is made so.
+    """The number of frames of an existing video with this provenance; 0 if there is no video.
 
     Raises:
-        InputError: another one is.
+        InputError: the existing video has another provenance.
     """
     if not is_video(output):
         return 0
@@ -192,9 +194,9 @@ def _frames_of(output: Path, made: dict[str, Any]) -> int:
 def _with_its_codes(
     source: Path, reading: Reading
 ) -> tuple[LightField | StoredLightField, Literal["srgb", "linear"], list[str] | None]:
-    """A light field with its samples as the files have them, how they stand for light, and what was assumed.
+    """A light field with samples as stored in the files, their encoding, and the assumed parameters.
 
-    Of a store, which knows where it comes from, nothing is assumed: None.
+    For a store, which records its origin, the last is None.
     """
     if is_store(source):
         return reading.light_field(source), "linear", None
@@ -217,21 +219,21 @@ def _provenance(source: Path, assumed: list[str]) -> dict[str, Any]:
     }
 
 
-# --- the light fields of a folder that are frames of a video, in the order of the numbers in their names ---
+# --- the light fields of a folder as frames of a video, ordered by the numbers in their names ---
 
 
 _NUMBERED = re.compile(r"(.*?)([0-9]+)((?:\.[A-Za-z]\w*)*)")
 
 
 def numbered_frames(folder: Path) -> list[Path]:
-    """The folders and files whose names differ in a number alone, ``frame_0001``, by that number.
+    """The folders and files whose names differ only in a number, ``frame_0001``, ordered by it.
 
     Args:
-        folder: that holds them; what has no number in its name is passed over.
+        folder: their parent; entries without a number in their name are skipped.
 
     Raises:
-        InputError: no folder, nothing numbered in it, several kinds of names, or numbers that are missing or there
-            twice.
+        InputError: not a folder, no numbered entry, several kinds of names, or numbers that are missing or
+            repeated.
     """
     folder = expanded(folder)
     if not check_path(folder, "folder of frames"):

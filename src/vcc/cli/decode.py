@@ -1,6 +1,6 @@
 """``vcc decode``: from the raw recording of a computational camera to its light field.
 
-What recorded it decides the way: lenslets (`decode_lenslets`), or a mask of cosines (`decode_cosines`).
+The camera selects the method: lenslets (`decode_lenslets`), or a mask of cosines (`decode_cosines`).
 """
 
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ def decode(
 ) -> None:
     """Turn the raw recording of a plenoptic or mask-modulated camera into a light field."""
     output = free_output(output, written.overwrite)
-    exposed(written.exposure, kind_of(output, written.kind))  # what cannot be written, before the work
+    exposed(written.exposure, kind_of(output, written.kind))  # check the output before the work
     camera = None if recorded.camera is None else load_camera(recorded.camera)
     if camera is not None and way_of(camera) == "cosines":
         _refuse(given_options(lenslets), "for lenslets, and this camera has a mask of cosines")
@@ -65,22 +65,22 @@ def decode(
 
 
 def _refuse(options: list[str], why: str) -> None:
-    """Options that mean nothing for this camera."""
+    """Raise `InputError` if options were given that do not apply to this camera."""
     if options:
         raise InputError(f"{', '.join(options)} {'is' if len(options) == 1 else 'are'} {why}: leave it out")
 
 
 def write(field: LightField, output: Path, written: Written, source: Path) -> None:
-    """Write a light field and say what was written.
+    """Write a light field and print a summary.
 
     Args:
         field: the light field.
-        output: whose ending says the format.
-        written: how.
+        output: the path; its ending selects the format.
+        written: the options.
         source: the recording.
 
     Raises:
-        InputError: what `vcc.formats.writing.save_light_field` refuses.
+        InputError: see `vcc.formats.writing.save_light_field`.
     """
     ending = output.suffix.lower()
     options = exposed(written.exposure, kind_of(output, written.kind))
@@ -92,7 +92,7 @@ def write(field: LightField, output: Path, written: Written, source: Path) -> No
 
 
 def described(field: LightField, camera: Camera | None, output: Path) -> list[str]:
-    """What a decoded light field is, and what to do next, in lines."""
+    """A summary of a decoded light field, and next steps, in lines."""
     nv, nu, nt, ns = field.shape[:4]
     colour = "grey" if field.channels is None else f"{field.channels} channels"
     metric = "" if camera else "; not metric without --camera: disparities are right, distances are not"

@@ -1,4 +1,4 @@
-"""``vcc decode`` of what was recorded through a mask of cosines."""
+"""``vcc decode`` of recordings through a mask of cosines."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +21,12 @@ from vcc.run.demosaic import demosaic
 @Parameter(name="*", group=Group("A camera with a mask of cosines", sort_key=3))
 @dataclass(frozen=True, kw_only=True)
 class Cosines:
-    """What there is of a camera with a mask of cosines.
+    """Options for a camera with a mask of cosines.
 
     Args:
-        calibration: A recording of something white through a pinhole in the middle of the aperture. Default:
+        calibration: A recording of a white surface through a pinhole in the middle of the aperture. Default:
             simulated.
-        border: Of the sensor, 0 to 0.25, that is faded out at each edge and cut off the views.
+        border: Share of the sensor, 0 to 0.25, that is faded out at each edge and cut off the views.
     """
 
     calibration: File | None = None
@@ -34,20 +34,20 @@ class Cosines:
 
 
 def through_a_mask(path: Path, camera: Camera, recorded: Recorded, given: Cosines) -> tuple[LightField, str]:
-    """The light field of a camera with a mask of cosines, and how it was calibrated, in words.
+    """The light field of a camera with a mask of cosines, and a description of the calibration.
 
     Args:
         path: of the recording.
         camera: the optics.
-        recorded: how it was recorded.
-        given: what there is of it besides; without a calibration, one is simulated.
+        recorded: options of the recording.
+        given: options of the mask; without a calibration, one is simulated.
 
     Raises:
-        InputError: what `vcc.recover.decode_heterodyne` refuses.
+        InputError: see `vcc.recover.decode_heterodyne`.
     """
     raw = read_raw(path, camera, None, recorded)
     check_camera(raw, camera, recorded.camera)
-    # Of the same camera and a pinhole: another hash, and that is no contradiction.
+    # Recorded by the same camera with a pinhole: its hash differs, so `check_camera` does not apply.
     shadow = None if given.calibration is None else read_raw(given.calibration, camera, None, recorded).light()
     light: NDArray[Any] = raw.light()
     with progress("Decoding"):

@@ -1,4 +1,4 @@
-"""``vcc decode`` of what a plenoptic camera recorded through its lenslets."""
+"""``vcc decode`` of recordings of a plenoptic camera with lenslets."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from vcc.recover import LensletGrid, decode_plenoptic, find_lenslets
 @Parameter(name="*", group=Group("A camera with lenslets", sort_key=2))
 @dataclass(frozen=True, kw_only=True)
 class Lenslets:
-    """What there is of a camera with lenslets.
+    """Options for a camera with lenslets.
 
     Args:
-        white: A recording of something evenly white by the same camera: micro-images are found in it, and the
-            recording is divided by it.
+        white: A recording of an evenly white surface by the same camera: micro-images are found in it, and
+            the recording is divided by it.
         dark: A recording without light, subtracted from both.
-        centres: Where the micro-images' centres are, .csv, .npy or .mat: two numbers each, pixels.
-        centres_order: Which of the two numbers comes first. Default: what the first line of a .csv says, or x-y.
-        centres_from: The number of the first pixel in them; 1 in lists made by MATLAB.
-        color_filter: Of a mosaic, row by row: RGGB and its like. Default: what the camera or the Lytro file says.
-        views: How many each way. Default: all that a circle in the micro-images holds.
+        centres: The centres of the micro-images, .csv, .npy or .mat: two numbers each, pixels.
+        centres_order: Which of the two numbers comes first. Default: from the first line of a .csv, or x-y.
+        centres_from: The number of the first pixel in --centres; 1 in lists made by MATLAB.
+        color_filter: Of a mosaic, row by row, such as RGGB. Default: from the camera or the Lytro file.
+        views: How many each way. Default: as many as fit in a circle in the micro-images.
         view_step: Between views, within a micro-image.
     """
 
@@ -53,16 +53,16 @@ class Lenslets:
 def through_lenslets(
     path: Path, camera: Camera | None, recorded: Recorded, given: Lenslets
 ) -> tuple[LightField, str]:
-    """The light field of a plenoptic camera, and how its micro-images were found, in words.
+    """The light field of a plenoptic camera, and a description of its micro-images.
 
     Args:
         path: of the recording.
         camera: the optics, for a metric frame.
-        recorded: how it was recorded.
-        given: what there is of it besides.
+        recorded: options of the recording.
+        given: options of the lenslets.
 
     Raises:
-        InputError: micro-images whose place nothing tells, or what `vcc.recover.decode_plenoptic` refuses.
+        InputError: the positions of the micro-images are unknown, or see `vcc.recover.decode_plenoptic`.
     """
     if given.dark is not None and recorded.black is not None:
         raise InputError("--black is said pixel by pixel by --dark: leave it out")
@@ -112,7 +112,7 @@ def _lattice(
     dark: NDArray[Any] | None,
     camera: Camera | None,
 ) -> tuple[LensletGrid, str]:
-    """Where the micro-images are, and who says so."""
+    """The lattice of micro-images, and the source of its position."""
     if listed is not None:
         return listed, "given centres"
     if white is not None:
@@ -129,17 +129,17 @@ def _lattice(
 
 
 def _each_channel(dark: NDArray[Any] | None, raw: RawRecording) -> NDArray[Any] | None:
-    """What stands for no light, in as many channels as the recording has."""
+    """The dark level in as many channels as the recording has."""
     if dark is None or dark.ndim >= raw.numbers.ndim:
         return dark
     return np.broadcast_to(dark[..., None], raw.numbers.shape)
 
 
-# --- where micro-images are ---
+# --- positions of micro-images ---
 
 
 _ORDERS = {"x y": "x-y", "row column": "row-column", "row col": "row-column"}
-"""What a CSV's first line may say."""
+"""Supported first lines of a CSV."""
 
 
 def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> LensletGrid:
@@ -147,15 +147,15 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
 
     Args:
         path: of the list, .csv, .txt, .npy or .mat.
-        order: "x-y" or "row-column"; None takes what the list's first line says, or x-y.
+        order: "x-y" or "row-column"; None uses the list's first line, or x-y.
         first: the number of the first pixel, 0 or 1.
         bright: a recording that should be brighter at the centres than between them.
 
     Warns:
-        ResultWarning: it is not.
+        ResultWarning: the recording is not brighter at the centres.
 
     Raises:
-        InputError: no such list, one that cannot be read, that lies outside of the recording, or is no lattice.
+        InputError: the list does not exist, cannot be read, lies outside the recording, or is not a lattice.
     """
     listed, said = _listed(expanded(path))
     if order is not None and said not in (None, order):
@@ -164,7 +164,7 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
     if (order or said or "x-y") == "row-column":
         places = places[:, ::-1]
     rows, columns = bright.numbers.shape[:2]
-    if bright.turned:  # the list counts the file's pixels
+    if bright.turned:  # the list refers to pixels of the file
         places = (columns - 1, rows - 1) - places
     outside = float(np.mean((places < -0.5).any(axis=1) | (places > (columns - 0.5, rows - 0.5)).any(axis=1)))
     if outside > 0.5:
@@ -179,7 +179,7 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
     at_centres, *gaps = (
         _mean_light(light, grid.centre_of(*(index + shift).T)) for shift in [(0.0, 0.0), *between]
     )
-    if at_centres < 1.05 * max(gaps):  # of a sound list it is about twice that
+    if at_centres < 1.05 * max(gaps):  # with a correct list the ratio is about 2
         warnings.warn(
             f"{bright.path.name} is not brighter at the centres in {path.name} than between them: are they in the "
             "order x-y (--centres-order), counted from 0 (--centres-from), and of this camera?",
@@ -190,7 +190,7 @@ def grid_of(path: Path, order: str | None, first: int, bright: RawRecording) -> 
 
 
 def _mean_light(light: NDArray[np.float64], places: NDArray[np.float64]) -> float:
-    """Over 2×2 pixels each, so that a mosaic's filters count alike."""
+    """Mean over 2×2 pixels each, so that all filters of a mosaic have the same weight."""
     x, y = np.floor(places).astype(int).T
     return float(np.mean([light[y + down, x + across] for down in (0, 1) for across in (0, 1)]))
 

@@ -18,10 +18,10 @@ def demo(
     """Run the paper's examples and its own check, and explain them on a page of pictures.
 
     Args:
-        output: Where the pictures go.
-        light_field: A light field of your own: a folder of views, a file or a store. Default: a scene that the
+        output: Folder for the pictures.
+        light_field: Your own light field: a folder of views, a file or a store. Default: a scene that the
             demo makes.
-        small: Fewer views and pixels: a look in seconds.
+        small: Fewer views and pixels, for a quick look.
     """
     from rich.console import Console
 

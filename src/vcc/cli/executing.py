@@ -1,4 +1,4 @@
-"""Who runs the blocks of a light field, as one asks for it on the command line."""
+"""The executor of the blocks of a light field, as an option of the command line."""
 
 import multiprocessing
 import signal
@@ -20,7 +20,7 @@ from vcc.store import is_store
 
 DASK = "dask://"
 CONNECTING = 10.0
-"""Seconds in which a scheduler answers."""
+"""Seconds to wait for a scheduler."""
 
 
 Who = Annotated[str | None, Parameter(metavar="EXECUTOR")]
@@ -29,27 +29,28 @@ Who = Annotated[str | None, Parameter(metavar="EXECUTOR")]
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
 class Executing:
-    """Who runs the blocks of a light field.
+    """The executor of the blocks of a light field.
 
     Args:
-        executor: Of a light field in a store: who reads and runs its blocks. `processes` or `threads`, one for
-            each core of this machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task takes one
-            thread and a memory limit of its own. Default: one block after the other, each by all cores.
+        executor: For a light field in a store: what reads and processes its blocks. `processes` or `threads`,
+            one per core of this machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task
+            uses one thread and a memory limit of its own. Default: one block after the other, each on all
+            cores.
     """
 
     executor: Who = None
 
     def check_name(self) -> None:
-        """Refuse an executor that there is not.
+        """Check the name of the executor.
 
         Raises:
-            InputError: there is none of that name.
+            InputError: there is no such executor.
         """
         if self.executor not in (None, "processes", "threads") and not self.executor.startswith(DASK):
             raise InputError(f'--executor is processes, threads or "{DASK}host:8786", not {self.executor!r}')
 
     def check(self, light_field: Path) -> None:
-        """Refuse what does not go together, before the light field is read.
+        """Check the options before the light field is read.
 
         Raises:
             InputError: no such executor, or a light field that is not in a store.
@@ -63,7 +64,7 @@ class Executing:
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
-        """The executor while it is needed; None where none is asked for.
+        """The executor, open within the context; None if none is selected.
 
         Raises:
             InputError: Dask is not installed, or its scheduler does not answer.
@@ -92,7 +93,7 @@ def _processes() -> Iterator[Any]:
     try:
         yield pool
     except BaseException:
-        for process in multiprocessing.active_children():  # what they are at is no longer wanted
+        for process in multiprocessing.active_children():  # their work is no longer needed
             process.terminate()
         raise
     finally:
@@ -100,7 +101,7 @@ def _processes() -> Iterator[Any]:
 
 
 def _leave_interrupts() -> None:
-    """Ctrl-C reaches all processes of a terminal: the first of them ends the others."""
+    """Ignore Ctrl-C in workers: it reaches all processes of a terminal, and the main process ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 

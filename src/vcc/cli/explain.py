@@ -1,4 +1,4 @@
-"""``vcc explain``: how a picture would be made."""
+"""``vcc explain``: how an image would be made."""
 
 from vcc.cli.console import show
 from vcc.cli.executing import Executing

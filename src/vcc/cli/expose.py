@@ -1,4 +1,4 @@
-"""``vcc expose``: what a real sensor would record."""
+"""``vcc expose``: the recording of a real sensor."""
 
 from pathlib import Path
 from typing import Annotated
@@ -33,14 +33,14 @@ def expose(
         output: The raw numbers, .tif, .png or .npy: linear, not scaled, upside down as recorded.
         exposure: Exposure time, "10 ms". auto brings the brightest 0.1 % of the pixels to 90 % of saturation.
         seed: Of the sensor's noise, 0 or more.
-        radiance: What the light field's white (a value of 1) stands for, in W/(m² sr).
-        picture: Write also a picture of it for people, demosaiced and upright; or linear, .exr and .npy.
+        radiance: Radiance of the light field's white (a value of 1), in W/(m² sr).
+        picture: Also write an image for viewing, demosaiced and upright; linear if .exr or .npy.
     """
     output = check_output(output, RAW_ENDINGS)
     if picture is not None:
         picture = check_output(picture, WRITE_ENDINGS)
     optics = load_camera(camera)
-    if optics.sensor.electronics is None:  # refused before the light field is read
+    if optics.sensor.electronics is None:  # checked before the light field is read
         raise InputError(
             f"{camera} does not say how its sensor records: add a table [sensor.electronics], which may be "
             "empty for an ordinary one. Irradiance can be had without (vcc capture)"

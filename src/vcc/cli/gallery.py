@@ -19,9 +19,9 @@ def gallery(
     """Rebuild a published camera, from optics to decoded result, and compare it with its claims.
 
     Args:
-        name: Of a camera. Without it, all are listed.
-        light_field: A light field of your own: a folder of views, a file or a store. Default: the built-in scene.
-        output: Where the page and its pictures go. Default: vcc-gallery/NAME.
+        name: Name of a camera. Without it, all are listed.
+        light_field: Your own light field: a folder of views, a file or a store. Default: the built-in scene.
+        output: Folder for the page and its pictures. Default: vcc-gallery/NAME.
     """
     if name is None:
         for each in entries():

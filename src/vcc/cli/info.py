@@ -1,4 +1,4 @@
-"""``vcc info``: what a light field is."""
+"""``vcc info``: a report on a light field."""
 
 import math
 import warnings
@@ -43,10 +43,10 @@ def info(
     """Report views, geometry, disparities and brightness of a light field, and what is unknown.
 
     Args:
-        quick: Read one view only: nothing is measured, and no view compared.
-        picture: Draw all views where their cameras stand, .png, .svg or .pdf.
-        keep: Write the cameras into the folder, as parameters.cfg, so that nothing is assumed when it is opened
-            again: what the options below say, else what the files state, else what is assumed.
+        quick: Read one view only: nothing is measured, and views are not compared.
+        picture: Draw all views at the positions of their cameras, .png, .svg or .pdf.
+        keep: Write the cameras into the folder, as parameters.cfg, so that nothing is assumed when it is
+            opened again. The options below have priority, then the files, then the assumptions.
     """
     if picture is not None:
         picture = check_output(picture, DRAWINGS)
@@ -62,10 +62,10 @@ def describe(
     picture: Path | None = None,
     keep: bool = False,
 ) -> str:
-    """What ``vcc info`` says of a path, read so; for the other arguments see `info`.
+    """The text that ``vcc info`` prints for a path; for the other arguments see `info`.
 
     Raises:
-        InputError: what its reader says, or an option that does not fit it.
+        InputError: it cannot be read, or an option does not apply to it.
     """
     path = expanded(light_field)
     given = [*given_options(how, but=("transfer",)), *(["--keep"] if keep else [])]
@@ -92,7 +92,7 @@ def describe(
 
 
 def _keep(path: Path, how: Reading) -> str:
-    """Keep the cameras in the folder: in which file, and what of it nobody has said."""
+    """Save the cameras in the folder; return the file, and which of them were assumed."""
     assumed = _with(how, read_geometry(path, sparse=True, **how.given(Arrangement))).unknown
     file = keep_geometry(path, **how.given(ViewCameras), **how.given(Arrangement))
     if not assumed:
@@ -102,21 +102,21 @@ def _keep(path: Path, how: Reading) -> str:
 
 
 def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
-    """Of a folder or a file, by names; measured, and drawn, by reading views."""
+    """Facts of a folder or a file by name; views are read to measure and to draw."""
     facts = _with(how, read_geometry(path, sparse=True, **how.given(Arrangement)))
     lines = _facts(facts)
     if quick and picture is None:
         return lines
-    with warnings.catch_warnings():  # of what is assumed and what is dark, which the lines say
+    with warnings.catch_warnings():  # on assumptions and dark views, which the lines report
         for said in (".* do not state ", ".* black or nearly so"):
             warnings.filterwarnings("ignore", message=said, category=ResultWarning)
         return lines | _measured(path, facts, quick, picture, how)
 
 
 def _measured(path: Path, facts: FolderInfo, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
-    """What the views show, by names."""
+    """Measurements of the views, by name."""
     lines = {}
-    # Numbers as they are stored, where they can be had: disparities do not need light, and memory is short.
+    # Use the stored numbers if possible: disparities do not need linear light, and it takes more memory.
     as_stored, transfer = facts.codes
     if facts.missing:
         where = how.given(Arrangement)
@@ -137,7 +137,7 @@ def _measured(path: Path, facts: FolderInfo, quick: bool, picture: Path | None, 
 
 
 def _with(how: Reading, facts: FolderInfo) -> FolderInfo:
-    """Facts with what the user says of the cameras."""
+    """Facts with the camera parameters that the user gave."""
     given = how.given(ViewCameras)
     unknown = tuple(name for name in facts.unknown if name not in given)
     if "spacing" in given:
@@ -146,7 +146,7 @@ def _with(how: Reading, facts: FolderInfo) -> FolderInfo:
 
 
 def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]:
-    """Of a store, by names."""
+    """Facts of a store, by name."""
     stored = open_store(path)
     lines = store_facts(stored, quick)
     there = stored.shape[:2]
@@ -170,7 +170,7 @@ def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
 
 
 def _of_a_video(path: Path, quick: bool, picture: Path | None) -> dict[str, str]:
-    """Of a video, by names."""
+    """Facts of a video, by name."""
     video = open_video(path)
     if picture is not None and video:
         raise InputError(f"{path} is a video: draw the views of one frame, {video[0].path}")
@@ -188,7 +188,7 @@ def _of_a_video(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
 
 
 def _facts(facts: FolderInfo) -> dict[str, str]:
-    """What the folder or file states and what is taken for granted, line by line."""
+    """What the folder or file states, and what is assumed, line by line."""
 
     def assumed(name: str) -> str:
         return "  (not stated: assumed)" if name in facts.unknown else ""
@@ -243,7 +243,7 @@ def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
 
 
 def _light(views: Views) -> dict[str, str]:
-    """How bright the views are, and which are dark, by names; each view is read once."""
+    """The brightness of the views, and which are dark, by name; each view is read once."""
     light: dict[tuple[int, int], float] = {}
 
     def passing() -> Iterator[NDArray[Any]]:
@@ -258,7 +258,7 @@ def _light(views: Views) -> dict[str, str]:
 
 
 def _disparities(field: LightField, facts: FolderInfo) -> str:
-    """The disparities and what they mean in metres."""
+    """The disparities, and the distances in metres that they correspond to."""
     known = field.measured_disparity_range()
     if known is None:
         return "none to measure: one view, or pictures without texture"

@@ -1,7 +1,8 @@
-"""Options that several commands share: values with units, and records that are laid flat into each command.
+"""Options that several commands share: values with units, and records whose fields become options of a command.
 
 A record is declared once; its docstring is its help. `given_options` returns the options that a user gave.
-Annotations are objects here, not strings: cyclopts reads them also where a record is extended in another file.
+Annotations are objects here, not strings: cyclopts evaluates them also if a record is extended in another
+file.
 """
 
 import dataclasses
@@ -32,7 +33,7 @@ READING = Group("Reading the light field", sort_key=3)
 
 
 def length(text: str, option: str) -> float:
-    """Metres of a length on the command line; "inf" is one.
+    """Metres of a length on the command line; "inf" is accepted.
 
     Raises:
         InputError: no unit, or not a length.
@@ -41,7 +42,7 @@ def length(text: str, option: str) -> float:
 
 
 def lengths(text: str, option: str) -> float | tuple[float, float]:
-    """Metres of one length, or of two with a comma between them.
+    """Metres of one length, or of two separated by a comma.
 
     Raises:
         InputError: more than two, no unit, or not a length.
@@ -85,7 +86,7 @@ def above_zero(text: str, option: str) -> float:
 
 
 def whole_number(text: str, option: str) -> int:
-    """A whole number; one with a fraction is not rounded.
+    """A whole number; fractions are rejected, not rounded.
 
     Raises:
         InputError: anything else.
@@ -106,11 +107,11 @@ def duration(text: str, option: str) -> float:
 
 
 Reader = Callable[[str, str], Any]
-"""A value from its text and the name of its option, for messages."""
+"""Function from the text of a value and the name of its option, for messages, to the value."""
 
 
 def auto_or(read: Reader) -> Reader:
-    """What reads "auto" besides."""
+    """A reader that also accepts "auto"."""
 
     def read_either(text: str, option: str) -> Any:
         try:
@@ -129,14 +130,14 @@ def quantity(
     repeated: bool = False,
     written: Callable[[Any], str] = str,
 ) -> Parameter:
-    """How an option is read, and its default shown; a minus in front is part of its value.
+    """How an option is parsed and its default is shown; a leading minus is part of its value.
 
     Args:
-        metavar: what stands for the value in help.
-        read: a token's value, or each token's where there are more.
-        tokens: how many words it takes.
+        metavar: placeholder for the value in help.
+        read: parses a token, or each token if there are several.
+        tokens: number of words of a value.
         repeated: whether it may be given more than once; the value is then a tuple.
-        written: a default as one would type it.
+        written: formats a default as one would type it.
     """
 
     def converter(_: Any, given: tuple[Token, ...]) -> Any:
@@ -198,10 +199,10 @@ Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
 
 
 def exposed(exposure: float | Literal["auto"], kind: Kind) -> dict[str, Any]:
-    """What the writer of a format takes of an exposure of views.
+    """Keyword arguments of the writer of a format for an exposure of views.
 
     Raises:
-        InputError: an exposure for a format that has none.
+        InputError: the format has no exposure.
     """
     if exposure == 1:
         return {}
@@ -214,7 +215,7 @@ def exposed(exposure: float | Literal["auto"], kind: Kind) -> dict[str, Any]:
 
 
 def given_options(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
-    """The options of a record that are not at their defaults, as they are typed."""
+    """The options of a record that differ from their defaults, as typed."""
     fields = [field for field in dataclasses.fields(record) if field.name not in but]
     changed = [field.name for field in fields if getattr(record, field.name) != field.default]
     return [f"--{name.replace('_', '-')}" for name in changed]
@@ -222,10 +223,10 @@ def given_options(record: Any, *, but: tuple[str, ...] = ()) -> list[str]:
 
 @dataclass(frozen=True)
 class Given:
-    """A record of options of which None and False stand for those that nobody gave."""
+    """A record of options; None and False mean that an option was not given."""
 
     def given(self, part: type["Given"] | None = None) -> dict[str, Any]:
-        """What is given, by name; of a part, that which another record has as well."""
+        """The given options by name; with ``part``, only the fields that ``part`` has."""
         names = [field.name for field in dataclasses.fields(type(self) if part is None else part)]
         chosen = {name: getattr(self, name) for name in names}
         return {name: value for name, value in chosen.items() if value is not None and value is not False}
@@ -234,14 +235,13 @@ class Given:
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
 class ViewCameras(Given):
-    """The cameras of the views, as far as the user knows better than the files.
+    """The cameras of the views, if the user knows more than the files state.
 
     Args:
-        spacing: Distance between neighbouring views with its unit, "1 mm"; two of them, "1 mm, 2 mm", are for rows
-            and columns. Default: what the folder states.
-        slope_per_pixel: Pixel pitch over focal length of the cameras, no unit. Default: what the folder states.
-        focus_distance: Where the views converge, "1.2 m", or inf if they are parallel. Default: what the folder
-            states.
+        spacing: Distance between neighbouring views with its unit, "1 mm"; two lengths, "1 mm, 2 mm", are for
+            rows and columns. Default: from the files.
+        slope_per_pixel: Pixel pitch over focal length of the cameras, no unit. Default: from the files.
+        focus_distance: Where the views converge, "1.2 m", or inf if they are parallel. Default: from the files.
     """
 
     spacing: Lengths | None = None
@@ -252,17 +252,18 @@ class ViewCameras(Given):
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
 class Arrangement(Given):
-    """Where views stand, in files that do not say it.
+    """The arrangement of views, for files that do not state it.
 
     Args:
-        views: Rows and columns of views, "9 9": for names that only count on, for a video over a grid, and for one
-            picture of all views, which must be told. Default: found from names, or from the pictures.
-        order: How names that only count on, or the frames of a video, pass through the views: row by row
-            (row-major), column by column, to and fro (serpentine: every other row backwards), or the fields of one
-            colour of a chessboard before the others (chess). Default: found from the pictures.
-        every: Of a video, take each so-many-th frame as a view. Default: all.
-        layout: What one picture of all views is: a mosaic, whole views side by side, or eslf, the blocks of views
-            of lenslets side by side. Default: found from the picture.
+        views: Rows and columns of views, "9 9": for names with a single running number, for a video over a
+            grid, and for one picture of all views, which requires it. Default: found from names, or from the
+            pictures.
+        order: Order of the views in names with a running number, or in the frames of a video: row by row
+            (row-major), column by column, serpentine (every other row backwards), or the fields of one colour
+            of a chessboard before the others (chess). Default: found from the pictures.
+        every: For a video, use every Nth frame as a view. Default: all.
+        layout: Layout of one picture of all views: a mosaic, whole views side by side, or eslf, the blocks of
+            views of lenslets side by side. Default: found from the picture.
         files_outside: Let a views.csv name files outside of its folder. Only for lists that you trust.
     """
 
@@ -279,28 +280,28 @@ class Reading(Arrangement, ViewCameras):
     """How a light field is read.
 
     Args:
-        transfer: How pixel values of the views stand for light: srgb, as pictures for people do, linear
-            (proportional to it), or auto: as the files say, srgb where they say nothing. as-is takes the stored
-            numbers as linear, whatever they say. A store is linear light.
-        orientation: Which way rows and columns of views run. auto checks it by parallax and puts it right; as-is
-            takes the files as they are.
+        transfer: Encoding of the views' pixel values: srgb, as in pictures for viewing, linear (proportional
+            to light), or auto: as the files state, srgb if they do not. as-is reads the stored numbers as
+            linear, whatever the files state. A store contains linear light.
+        orientation: Direction of rows and columns of views. auto checks it by parallax and corrects it; as-is
+            uses the files as they are.
     """
 
     transfer: Literal["auto", "srgb", "linear", "as-is"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
 
     def light(self, path: Path) -> LightField | StoredLightField | StoredVideo:
-        """As `light_field`, and a video is opened, too."""
+        """As `light_field`, but a video is supported, too."""
         if not is_video(path):
             return self.light_field(path)
         self._check_nothing_told(path)
         return open_video(path)
 
     def light_field(self, path: Path) -> LightField | StoredLightField:
-        """The light field that is asked for, with a progress bar; a store is opened, not read.
+        """The light field at a path, read with a progress bar; a store is opened, not read.
 
         Raises:
-            InputError: what `vcc.open_light_field` refuses; a video; a store and cameras told beside it.
+            InputError: see `vcc.open_light_field`; a video; a store with camera options.
         """
         if is_store(path):
             self._check_nothing_told(path)
@@ -313,7 +314,7 @@ class Reading(Arrangement, ViewCameras):
             raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
 
     def in_memory(self, path: Path) -> LightField:
-        """The light field that is asked for, all of it read."""
+        """The light field at a path, read into memory."""
         field = self.light_field(path)
         return field if isinstance(field, LightField) else field.read()
 
@@ -321,7 +322,7 @@ class Reading(Arrangement, ViewCameras):
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Making(How):
-    """How a picture is made; the help is that of `How`, but where lengths and sizes carry units here."""
+    """How an image is made; the help is that of `How`, except that lengths and sizes have units here."""
 
     scene_distance: Annotated[
         Length | None,
@@ -344,7 +345,7 @@ class Making(How):
 
 
 def _for_people(docstring: str) -> str:
-    """A record's docstring as help: sentences begin with a capital, code loses its quotes, None is a default."""
+    """A record's docstring as help: initial capitals, code without quotes, None as a default."""
     text = re.sub(r"(?m)^( +\w+: )(\w)", lambda match: match[1] + match[2].upper(), docstring)
     text = re.sub(r'``"(\w+)"``', r"`\1`", text)
     text = re.sub(r";\s+None\s+does\s+not\.", ".", text)

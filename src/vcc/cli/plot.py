@@ -1,4 +1,4 @@
-"""``vcc plot``: a camera from the side, or a light field's way through it."""
+"""``vcc plot``: a camera from the side, or a light field's path through it."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -27,15 +27,16 @@ def plot(
     """Draw a camera from the side with rays, or a light field's way through it in phase space.
 
     Args:
-        output: The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, here.
+        output: The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, in the current
+            folder.
         object_distance: Distance of a point to draw rays from, "1.2 m", or inf; may be repeated. Default: the
             distance in focus and a nearer one.
         across: The axis drawn upwards.
         light_field: A folder of views: rays fill its width; --phase-space draws it.
-        phase_space: Draw the u–s diagram of the light field instead: at the entrance, behind each element, on the
-            sensor.
-        slice: With --phase-space: two of u, v, s and t to draw, such as uv; the other two are held at the light
-            field's middle. Default: us, or vt with --across y.
+        phase_space: Draw the u–s diagram of the light field instead: at the entrance, behind each element, on
+            the sensor.
+        slice: With --phase-space: two of u, v, s and t to draw, such as uv; the other two are fixed at the
+            light field's middle. Default: us, or vt with --across y.
     """
     if phase_space and light_field is None:
         raise InputError("--phase-space draws a light field: give it with --light-field FOLDER")

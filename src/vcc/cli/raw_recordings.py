@@ -1,4 +1,4 @@
-"""Raw recordings read from files: their numbers, and what those stand for."""
+"""Raw recordings read from files: their numbers and their encoding."""
 
 import warnings
 from dataclasses import dataclass, replace
@@ -35,17 +35,17 @@ Tile = str | tuple[str, ...]
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """How it was recorded.
+    """How a recording was made.
 
     Args:
-        camera: What recorded it: lenses and, last, an array of lenslets; or lenses and a mask of cosines. With it
-            distances are right; without it only disparities are.
-        transfer: How the numbers of files that do not say it stand for light: linear (proportional to it), as raw
-            numbers do, or srgb, as pictures for people do.
-        upright: How files that do not say it lie: upright as people see it, or upside down as on a sensor.
-        black: The number in RAW that stands for no light. Default: what --dark, the camera's electronics or the
-            Lytro file say, or 0.
-        memory_limit: What the light field may take, "1.5 GB".
+        camera: The camera that made the recording: lenses and, last, an array of lenslets; or lenses and a
+            mask of cosines. With it distances are metric; without it only disparities are right.
+        transfer: Encoding of files that do not state it: linear (proportional to light), as raw numbers, or
+            srgb, as pictures for viewing.
+        upright: Orientation of files that do not state it: upright, or upside down as on a sensor.
+        black: The number in RAW that corresponds to no light. Default: from --dark, the camera's electronics
+            or the Lytro file, or 0.
+        memory_limit: Memory for the light field, "1.5 GB".
     """
 
     camera: Annotated[Path | None, Parameter(metavar="CAMERA.toml")] = None
@@ -57,15 +57,15 @@ class Recorded:
 
 @dataclass(frozen=True, eq=False)
 class RawRecording:
-    """A recording read: its numbers as they lie on a sensor, upside down, and what they stand for.
+    """A recording as read: its numbers in the orientation of the sensor, upside down, and their encoding.
 
     Args:
         path: the file.
-        numbers: (rows, columns[, channels]); irradiance where the file says what its own numbers are.
-        black: what stands for no light, (rows, columns), or None for 0.
-        largest: what stands for the most light; 1 where nothing is known, and of irradiance.
+        numbers: (rows, columns[, channels]); irradiance if the file states its encoding.
+        black: the level of no light, (rows, columns), or None for 0.
+        largest: the level of the most light; 1 if unknown, and for irradiance.
         color_filter: of a mosaic.
-        turned: whether the file has it upright.
+        turned: whether the file is upright.
         metadata: of the file; None for values as given on the command line, or of a Lytro camera.
     """
 
@@ -78,7 +78,7 @@ class RawRecording:
     metadata: ImageMetadata | None = None
 
     def light(self) -> NDArray[np.float64]:
-        """0 for none, 1 for the most."""
+        """Light from 0 for none to 1 for the most."""
         numbers = self.numbers.astype(np.float64)
         if self.black is not None:
             numbers -= self.black if numbers.ndim == 2 else self.black[..., None]
@@ -86,30 +86,29 @@ class RawRecording:
 
     @property
     def scale(self) -> float:
-        """From no light to the most, in numbers."""
+        """The range from no light to the most, in numbers."""
         return self.largest - (0.0 if self.black is None else float(self.black.mean()))
 
     @property
     def in_words(self) -> str:
-        """What the file says, for people; empty where it says nothing."""
+        """What the file states, as text; empty without metadata."""
         return "" if self.metadata is None else f"{self.path.name} says: {self.metadata.in_words}"
 
 
 def read_raw(path: Path, camera: Train | None, color_filter: str | None, recorded: Recorded) -> RawRecording:
-    """A picture or a Lytro file; what its numbers are is as the file says, or else as told.
+    """A picture or a Lytro file; the encoding comes from the file, or else from the options.
 
     Args:
         path: the file.
-        camera: whose electronics tell of numbers that do not say what they are, if it has any.
-        color_filter: of a mosaic, as the file has it.
-        recorded: what was told.
+        camera: its electronics, if any, give the encoding of files that do not state it.
+        color_filter: of a mosaic, in the orientation of the file.
+        recorded: the options.
 
     Raises:
-        InputError: a file that cannot be read, that neither says nor is told what its numbers are, or that says
-            otherwise than told.
+        InputError: the file cannot be read, its encoding is unknown, or the options contradict it.
 
     Warns:
-        ResultWarning: something was lost when it was written: pixels too bright, or all but 8 bits.
+        ResultWarning: information was lost when it was written: clipped pixels, or all but 8 bits.
     """
     path = expanded(path)
     if path.suffix.lower() in _LYTRO:
@@ -124,10 +123,10 @@ def read_raw(path: Path, camera: Train | None, color_filter: str | None, recorde
 
 
 def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
-    """Refuse another recording whose numbers are of another kind.
+    """Check that two recordings have the same kind of numbers.
 
     Raises:
-        InputError: one file says what its numbers are, and the other does not.
+        InputError: one file states its encoding, and the other does not.
     """
     if other is not None and (raw.metadata is None) != (other.metadata is None):
         says, silent = (raw, other) if other.metadata is None else (other, raw)
@@ -138,10 +137,10 @@ def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
 
 
 def check_camera(raw: RawRecording, camera: Train | None, told: Path | None) -> None:
-    """Say so where another camera than that of the camera file made a recording.
+    """Warn if a recording was made by another camera than that of the camera file.
 
     Warns:
-        ResultWarning: it did.
+        ResultWarning: the cameras differ.
     """
     made = None if raw.metadata is None else raw.metadata.camera
     if camera is None or told is None or made is None or made.hash is None:
@@ -173,7 +172,7 @@ def _read_lytro(path: Path, color_filter: str | None, recorded: Recorded) -> Raw
 def _with_metadata(
     picture: ImageWithMetadata, metadata: ImageMetadata, color_filter: str | None, recorded: Recorded
 ) -> RawRecording:
-    """Of a file that says what its numbers are: irradiance."""
+    """A recording from a file that states its encoding: irradiance."""
     path = picture.path
     check_agrees(path, metadata, recorded.transfer or "")
     if recorded.upright not in (None, metadata.upright):
@@ -201,7 +200,7 @@ def _with_metadata(
 def _as_given(
     picture: ImageWithMetadata, camera: Train | None, color_filter: str | None, recorded: Recorded
 ) -> RawRecording:
-    """Of a file that does not say what its numbers are."""
+    """A recording from a file that does not state its encoding."""
     path, numbers, black = picture.path, picture.samples, recorded.black
     whole = numbers.dtype.kind == "u"
     missing = []
@@ -233,7 +232,7 @@ def _as_given(
 
 
 def _as_recorded(raw: RawRecording) -> RawRecording:
-    """As it lies on the sensor, upside down: what was turned, is turned back, its tile of filters too."""
+    """The recording upside down, as on the sensor: an upright one is rotated, with its tile of filters."""
     if not raw.turned:
         return raw
     black = None if raw.black is None else raw.black[::-1, ::-1]
@@ -242,10 +241,10 @@ def _as_recorded(raw: RawRecording) -> RawRecording:
 
 
 def turned_tile(tile: Tile, shape: tuple[int, ...]) -> Tile:
-    """The tile of filters of a mosaic of that shape when it is turned by 180°.
+    """The tile of filters of a mosaic of this shape after a rotation by 180°.
 
     Raises:
-        InputError: what `vcc.Electronics` refuses.
+        InputError: see `vcc.Electronics`.
     """
     known = Electronics(color_filter=tile).color_filter
     assert known is not None

@@ -1,4 +1,4 @@
-"""``vcc refocus``: pictures of a light field focused elsewhere, focal stacks, and what is sharp in all of them."""
+"""``vcc refocus``: refocused images of a light field, focal stacks, and images sharp everywhere."""
 
 from typing import Annotated, Any
 
@@ -26,11 +26,11 @@ from vcc.recover.refocus import refocused
 from vcc.store import StoredLightField
 
 PICTURES_WITHOUT_STACK = 16
-"""How many pictures --all-in-focus takes where --stack does not say."""
+"""Images that --all-in-focus uses without --stack."""
 
 
 def _stack(_: Any, tokens: tuple[Token, ...]) -> tuple[float, ...]:
-    """The distances of a focal stack from its nearest, farthest and number of pictures."""
+    """The distances of a focal stack from its nearest, farthest and number of images."""
     nearest, farthest, number = (token.value for token in tokens)
     if not number.isdecimal():
         raise InputError(
@@ -61,21 +61,21 @@ def refocus(
     """Refocus a light field on one distance, on many, or on all.
 
     Args:
-        output: A picture, .png, .tif, .exr or .npy; of a focal stack a film, .mp4 or .gif.
+        output: An image, .png, .tif, .exr or .npy; for a focal stack a film, .mp4 or .gif.
         distance: Where to focus, "1.2 m", or inf.
-        stack: A focal stack: "0.8 m" "3 m" 12 focuses on 12 distances in equal steps of blur.
-        all_in_focus: One picture of all that is sharp in any of a focal stack; without --stack of one over the
-            scene's depth.
+        stack: A focal stack: "0.8 m" "3 m" 12 focuses at 12 distances in equal steps of blur.
+        all_in_focus: One image of everything that is sharp anywhere in a focal stack; without --stack, of a
+            stack over the scene's depth.
         aperture: Diameter of the round aperture, "10 mm". Default: all views.
-        exposure: Factor from radiance to the brightness of a picture for people. auto shows the brightest parts
-            white and says which factor that took.
+        exposure: Factor from radiance to the brightness of an image for viewing. auto shows the brightest
+            parts white and prints the factor.
         frames_per_second: Of a film.
-        interpolation: Within a view; sharp is linear with what that costs given back.
-        between_views: Whether to interpolate between views where neighbouring ones differ by more than a pixel:
-            auto does along one parallax, where nothing is in focus; depth makes views in between by each pixel's
-            own depth, which is found first and kept in a store; none never does.
-        memory_limit: What the pictures of a focal stack may take, "1.5 GB"; of one picture, what reading a store
-            in pieces may. Default: 1 GiB for pieces.
+        interpolation: Within a view; sharp is linear with its blur compensated.
+        between_views: Whether to interpolate between views if neighbouring ones differ by more than a pixel:
+            auto does along one parallax, if nothing is in focus; depth creates views in between by each
+            pixel's own depth, which is estimated first and kept in a store; none never does.
+        memory_limit: Memory for the images of a focal stack, "1.5 GB"; for one image, memory for reading a
+            store in pieces. Default: 1 GiB for pieces.
     """
     if distance is not None and (stack is not None or all_in_focus):
         raise InputError("--distance is one picture: leave out --stack and --all-in-focus")
@@ -109,7 +109,7 @@ def _distances_of(field: LightField | StoredLightField) -> tuple[float, ...]:
     """Distances over the depth that a light field's parallax shows.
 
     Raises:
-        InputError: it shows none, or things beyond infinity.
+        InputError: it shows no depth, or the whole scene lies beyond infinity.
     """
     found = field.measured_disparity_range()
     if found is None:

@@ -1,4 +1,4 @@
-"""``vcc spectrum``: the 4-D spectrum of a light field, drawn across two of its coordinates."""
+"""``vcc spectrum``: the 4-D spectrum of a light field, drawn over two of its coordinates."""
 
 from typing import Literal
 
@@ -24,16 +24,16 @@ def spectrum(
 
     Args:
         output: The drawing, .png, .svg or .pdf.
-        across: The two coordinates: the frequency of the first runs to the right.
-        of: power sums over the other two frequencies; section takes the plane through their zero.
-        window: hann: let pictures fade towards their borders, which otherwise show as a cross.
-        memory_limit: What the spectrum may take, "1.5 GB", at 8 bytes a sample. Default: 4 GiB.
+        across: The two coordinates; the frequency of the first is horizontal.
+        of: power sums over the other two frequencies; section is the plane through their zero.
+        window: hann fades views towards their borders, which otherwise appear as a cross.
+        memory_limit: Memory for the spectrum, "1.5 GB", at 8 bytes a sample. Default: 4 GiB.
     """
     output = check_output(output, DRAWINGS)
     field = reading.light_field(light_field)
     if not isinstance(field, LightField):
-        check_size(field.grid.shape, memory_limit, "the spectrum")  # before anything is read
+        check_size(field.grid.shape, memory_limit, "the spectrum")  # before reading
         field = field.read()
-    pictures_only = [None, None, "hann", "hann"]  # there are too few views to fade
+    pictures_only = [None, None, "hann", "hann"]  # there are too few views to fade across them
     found = fft4(field, pictures_only if window == "hann" else None, memory_limit=memory_limit)
     save_figure(plot_spectrum(found, (across[0], across[1]), of=of).figure, output)

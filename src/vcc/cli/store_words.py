@@ -1,4 +1,4 @@
-"""What stores are, in words."""
+"""Reports on stores as text."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from vcc.store import StoredLightField, StoredVideo
 from vcc.store.video_layout import Between
 
 LOOKED_AT = 3
-"""Frames of which a video's size on the disk and its brightness are told."""
+"""Frames from which a video's size on disk and its brightness are estimated."""
 BEYOND = 0.3
-"""Pixels per view beyond infinity, up to which it is noise of what is measured far away."""
+"""Pixels per view beyond infinity that count as noise of the measurement far away."""
 WRONG = "The spacing, focus distance or orientation of the views is wrong"
 EVENLY = 1e-6
-"""How much of a gap between frames the others may differ by, and be told as evenly spaced."""
+"""Relative difference of gaps between frames that still counts as evenly spaced."""
 BETWEEN_IN_WORDS: dict[Between, str] = {
     "linear": "light of both, mixed by time (linear)",
     "held": "light of the first, until the second (held)",
 }
-"""What there is between two frames, for people."""
+"""The interpolation between two frames, as text."""
 
 
 def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
-    """What a store states, by names.
+    """Facts of a store, by name.
 
     Args:
         stored: the store.
-        quick: leave out what takes reading views.
+        quick: omit everything that requires reading views.
     """
     nv, nu, nt, ns = stored.shape[:4]
     missing = stored.missing()
@@ -64,7 +64,7 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
 
 
 def places_of(grid: Grid, low: float, high: float) -> str:
-    """Where things of these disparities are, pixels per view along u, in words; beyond infinity, too."""
+    """Distances of objects with these disparities, pixels per view along u, as text; also beyond infinity."""
     near, far = grid.distance_of(high), grid.distance_of(low)
     if 0 < near < far:
         return f"things {short(near, digits=3)} to {_far(far)} away"
@@ -79,7 +79,7 @@ def _far(distance: float) -> str:
 
 
 def _assumed(provenance: dict[str, Any]) -> dict[str, str]:
-    """What of the cameras nobody stated, by name."""
+    """The camera parameters that were assumed, by name."""
     assumed = provenance.get("assumed")
     if not assumed:
         return {}
@@ -87,11 +87,11 @@ def _assumed(provenance: dict[str, Any]) -> dict[str, str]:
 
 
 def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
-    """What a video states, by names.
+    """Facts of a video, by name.
 
     Args:
         video: the video.
-        quick: leave out what takes looking at views.
+        quick: omit everything that requires reading views.
     """
     lines = {"format": "Zarr store of vcc, a video"}
     if not video:
@@ -120,12 +120,12 @@ def video_facts(video: StoredVideo, quick: bool) -> dict[str, str]:
 
 
 def looked_at(video: StoredVideo) -> list[int]:
-    """The frames of which is told what takes looking at views: all, or some of many."""
+    """The frames that are examined: all, or a few of many."""
     return spread(len(video), LOOKED_AT)
 
 
 def _apart(times: tuple[float, ...]) -> str:
-    """How far frames are apart, in words that follow others."""
+    """The gaps between frames, as the end of a sentence."""
     if len(times) < 2:
         return ""
     gaps = [after - before for before, after in pairwise(times)]
@@ -136,7 +136,7 @@ def _apart(times: tuple[float, ...]) -> str:
 
 
 def written(made: StoredLightField, packing: str) -> str:
-    """What was written, in a line or two."""
+    """A summary of a written store, in a line or two."""
     nv, nu, nt, ns = made.shape[:4]
     samples = math.prod(made.shape) * made.dtype.itemsize
     packed = made.stored_bytes
@@ -148,11 +148,11 @@ def written(made: StoredLightField, packing: str) -> str:
 
 
 def video_written(made: StoredVideo, before: int) -> str:
-    """What was appended to a video, in a line.
+    """A summary of the frames appended to a video, in a line.
 
     Args:
         made: the video.
-        before: frames that were there.
+        before: number of frames before.
     """
     new = "none of them new" if before == len(made) else f"{len(made) - before} of them new" if before else ""
     nv, nu, nt, ns = made.shape[:4]
@@ -164,7 +164,7 @@ def video_written(made: StoredVideo, before: int) -> str:
 
 
 def loss(lossy: dict[str, Any]) -> str:
-    """What lossy compression did, in words."""
+    """The effect of lossy compression, as text."""
     words = f"{lossy.get('codec')}, quality {lossy.get('quality')}"
     if not isinstance(lossy.get("psnr"), int | float):
         return f"{words}: no view was changed" if lossy.get("psnr") == "Infinity" else words

@@ -35,7 +35,7 @@ TOLD = Group("The table", sort_key=1.5)
 
 
 def _setting(text: str, option: str) -> tuple[str, str]:
-    """A parameter's name and its values."""
+    """The name of a parameter and its values, from NAME=VALUES."""
     name, equals, values = text.partition("=")
     if not (equals and name.strip() and values.strip()):
         raise InputError(f'{option} is "{text}": it is a name and values, like "sensor.z=50mm:54mm:40"')
@@ -45,13 +45,14 @@ def _setting(text: str, option: str) -> tuple[str, str]:
 @Parameter(name="*", group=TOLD)
 @dataclass(frozen=True, kw_only=True)
 class Told(Given):
-    """What is told of each picture, beside its mean, missing rays and sampling error.
+    """Columns of the table, in addition to each image's mean, missing rays and sampling error.
 
     Args:
-        sharpness: The energy of the picture's gradient over that of its mean.
-        target: PSNR against this picture, .exr, .npy, .png or .tif that vcc wrote.
-        deblurring: R(K), the expected error of deblurring a point at this distance, "2 m" (Zhou and Nayar 2009).
-        noise: For R(K): standard deviation of the noise, of pictures from 0 to 1.
+        sharpness: The energy of the image's gradient over that of its mean.
+        target: PSNR against this image, .exr, .npy, .png or .tif that vcc wrote.
+        deblurring: R(K), the expected error of deblurring a point at this distance, "2 m" (Zhou and Nayar
+            2009).
+        noise: For R(K): standard deviation of the noise, for images from 0 to 1.
     """
 
     sharpness: bool = False
@@ -61,7 +62,7 @@ class Told(Given):
 
     @property
     def metrics(self) -> dict[str, Any]:
-        """Functions of a picture by name."""
+        """Functions of an image by name."""
         found: dict[str, Any] = {"sharpness": sharpness} if self.sharpness else {}
         if self.target is not None:
             found["psnr"] = PSNR(load_image(self.target))
@@ -73,22 +74,22 @@ class Told(Given):
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
 class MakingMany(Executing):
-    """Who makes the pictures.
+    """The executor that makes the images.
 
     Args:
-        executor: Who makes the pictures, some cameras a task: `processes` or `threads`, one for each core of this
-            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task takes one thread and a
-            memory limit of its own. The light field is in a store, or takes at most 64 MiB. Default: cameras one
-            after the other, by all cores.
+        executor: What makes the images, some cameras per task: `processes` or `threads`, one per core of this
+            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread and a
+            memory limit of its own. The light field must be in a store, or take at most 64 MiB. Default: one
+            camera after the other, on all cores.
     """
 
     executor: Who = None
 
     def check_portable(self, light_field: Samples, path: Path) -> None:
-        """Refuse a light field in memory that is too large to be sent.
+        """Check that a light field in memory is small enough to be sent to tasks.
 
         Raises:
-            InputError: it is.
+            InputError: it is too large.
         """
         try:
             if self.executor is not None:
@@ -120,16 +121,17 @@ def sweep(
     """Capture the images of many cameras: a camera file with varied parameters.
 
     Args:
-        set: A parameter by the names of its element and its own, and values: a range "sensor.z=50mm:54mm:40" or
-            a list "code.pattern=mura,circle,code.png"; patterns as a camera file has them, or by name alone, as
-            large as the mask. May be repeated. For random and sobol also an interval, "sensor.z=50mm:54mm".
-        output: Pictures and table, .zarr; the same sweep goes on where it was stopped. Or the table alone, .csv or
-            .parquet.
+        set: A parameter, named by its element and its own name, and its values: a range
+            "sensor.z=50mm:54mm:40" or a list "code.pattern=mura,circle,code.png"; patterns as in a camera
+            file, or by name alone, as large as the mask. May be repeated. random and sobol also accept an
+            interval, "sensor.z=50mm:54mm".
+        output: Images and table, .zarr; the same command resumes an interrupted sweep. Or the table alone,
+            .csv or .parquet.
         design: grid: every combination; list: the first values of all, then the second; random, sobol: drawn.
-        count: How many cameras are drawn. Default: 64.
+        count: Number of cameras to draw. Default: 64.
         seed: Of the draw.
-        table: Write the table also here, .csv or .parquet.
-        sheet: Draw the pictures side by side, .png, .svg or .pdf.
+        table: Also write the table here, .csv or .parquet.
+        sheet: Draw the images side by side, .png, .svg or .pdf.
     """
     for name, _ in set:
         if [each for each, _ in set].count(name) > 1:
@@ -143,7 +145,7 @@ def sweep(
     executing.check_name()
     optics = load_camera(camera)
     asked = Design(dict(set), design, count, seed, camera.parent)
-    asked.of(optics)  # refused before the light field is read
+    asked.of(optics)  # checked before the light field is read
     field, metrics = reading.light_field(light_field), told.metrics
     executing.check_portable(field, light_field)
     kept = {"output": output} if stored else {"pictures": False}

@@ -1,4 +1,4 @@
-"""When a shutter is open, as one says it on the command line."""
+"""Exposure times as options of the command line."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +18,13 @@ Duration = Annotated[float, quantity("TIME", duration)]
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
 class Timing(Given):
-    """When the shutter is open before a video, or in a camera that moves.
+    """When the shutter is open, for a video or a time-varying camera.
 
     Args:
-        start: Of a video, when the shutter opens: "0.2 s". Default: with the first frame.
-        exposure_time: Of a video or a camera file with a table [moving], how long it stays open: "20 ms". Default:
-            of a video, for the moment --start.
-        time_tolerance: How exact the mean over that time is, as a share of the picture's mean.
+        start: For a video, when the shutter opens: "0.2 s". Default: with the first frame.
+        exposure_time: For a video, or a camera file with a table [moving], how long it stays open: "20 ms".
+            Default: for a video, the instant --start.
+        time_tolerance: Tolerance of the mean over that time, as a share of the image's mean.
     """
 
     start: Duration | None = None
@@ -32,16 +32,15 @@ class Timing(Given):
     time_tolerance: Annotated[float, quantity("NUMBER", above_zero)] = TOLERANCE
 
     def check(self, light_field: Path, camera: Path, moves: bool) -> None:
-        """Refuse what does not go together, before anything is read.
+        """Check the combination of options before anything is read.
 
         Args:
-            light_field: what the camera looks at.
+            light_field: of the capture.
             camera: its file.
-            moves: whether it changes over time.
+            moves: whether the camera is time-varying.
 
         Raises:
-            InputError: times for light that stays as it is and a camera that stands still, or none for one that
-                moves.
+            InputError: times for static light and a static camera, or none for a time-varying camera.
         """
         given, stays = given_options(self), expanded(light_field).exists() and not is_video(light_field)
         if moves and self.exposure_time is None:
@@ -64,7 +63,7 @@ class Timing(Given):
             light: a light field, or a video.
 
         Raises:
-            InputError: nothing is said of a video, or it has no frame.
+            InputError: a video without times given, or without frames.
         """
         length = self.exposure_time or 0.0
         if not isinstance(light, StoredVideo):

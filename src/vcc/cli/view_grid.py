@@ -1,4 +1,4 @@
-"""All views of a light field at a glance, each where its camera stands."""
+"""An overview of all views of a light field, each at the position of its camera."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class Views:
     """The views of a light field, one at a time.
 
     Args:
-        at: the samples of the view at (row, column); None if it is missing.
+        at: returns the samples of the view at (row, column); None if it is missing.
         shape: (rows, columns) of views.
         frame: of the light field.
-        transfer: "srgb" or "linear": how integers stand for light.
+        transfer: "srgb" or "linear": the encoding of integers.
     """
 
     at: Callable[[tuple[int, int]], NDArray[Any] | None]
@@ -43,7 +43,7 @@ class Views:
     transfer: str
 
     def all(self) -> Iterable[tuple[tuple[int, int], NDArray[Any]]]:
-        """Those there are, with their (row, column), row by row."""
+        """The existing views with their (row, column), row by row."""
         for place in _places(self.shape):
             view = self.at(place)
             if view is not None:
@@ -51,7 +51,7 @@ class Views:
 
 
 def draw(views: Views, title: str, path: Path, assumed: bool) -> str:
-    """Write the picture of the grid of views, and say so."""
+    """Write the drawing of the grid of views, and return a message."""
     figure = grid_figure(views.at, views.shape, views.frame, views.transfer, title, assumed)
     with atomic_path(path) as temporary:
         figure.savefig(temporary)
@@ -66,15 +66,15 @@ def grid_figure(
     title: str = "",
     assumed: bool = False,
 ) -> Figure:
-    """All views, small, each where its camera stands, seen as someone sees them who looks at the scene.
+    """A drawing of all views, small, at the positions of their cameras, oriented as seen towards the scene.
 
     Args:
-        at: the samples of the view at (row, column), None for one that is missing.
+        at: returns the samples of the view at (row, column), None for a missing one.
         shape: (rows, columns) of views.
-        frame: of the light field, for the places of the cameras.
-        transfer: "srgb" or "linear": how integers stand for light.
-        title: what is shown.
-        assumed: whether the places are assumed rather than known.
+        frame: of the light field, for the positions of the cameras.
+        transfer: "srgb" or "linear": the encoding of integers.
+        title: name of the light field.
+        assumed: whether the positions are assumed rather than known.
     """
     rows, columns = shape
     small = {place: _small(view, shape, transfer) for place in _places(shape) if (view := at(place)) is not None}
@@ -130,7 +130,7 @@ def _mark_missing(axes: Any, left: float, top: float, width: float, height: floa
 
 
 def _small(view: NDArray[Any], shape: tuple[int, int], transfer: str) -> NDArray[np.float32]:
-    """A view's linear light in blocks of whole pixels, so that all views fit on a sheet."""
+    """Linear light of a view, averaged over blocks of pixels so that all views fit on a sheet."""
     room = np.clip(_SHEET / max(shape), _SMALLEST, _LARGEST)
     step = max(1, math.ceil(max(view.shape[:2]) / room))
     height, width = (max(1, n // step) for n in view.shape[:2])
@@ -144,12 +144,12 @@ def _small(view: NDArray[Any], shape: tuple[int, int], transfer: str) -> NDArray
     step_y, step_x = light.shape[0] // height, light.shape[1] // width
     light = light.reshape(height, step_y, width, step_x, light.shape[2]).mean(axis=(1, 3))
     if light.shape[2] != 3:
-        light = np.repeat(light.mean(axis=2, keepdims=True), 3, axis=2)  # no colours that people know
+        light = np.repeat(light.mean(axis=2, keepdims=True), 3, axis=2)  # not displayable as colours
     return light
 
 
 def _exposure(small: dict[tuple[int, int], NDArray[np.float32]], shape: tuple[int, int]) -> np.float32:
-    """1 where the middle view is not too bright, else what makes it fit; dark pictures are brightened too."""
+    """The exposure of the overview: the factor that suits the middle view."""
     middle = ((shape[0] - 1) / 2, (shape[1] - 1) / 2)
     nearest = min(small, key=lambda place: math.dist(place, middle))
     return np.float32(auto_exposure(small[nearest]))
@@ -161,7 +161,7 @@ def _shown(light: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _unit(extent: float) -> tuple[str, float]:
-    """The unit that a length is best read in, and how many of it make a metre."""
+    """The unit in which a length is most readable, and the number of units per metre."""
     for unit, factor in (("m", 1.0), ("mm", 1e3), ("µm", 1e6)):
         if extent * factor >= 1:
             return unit, factor

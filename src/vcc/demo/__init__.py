@@ -1,4 +1,4 @@
-"""The paper's two examples and its own check, on a built-in scene or on someone's own light field."""
+"""The paper's two examples and its own check, on a built-in scene or on a light field of the user."""
 
 from vcc.demo.report import DemoReport, Timing
 from vcc.demo.run import run_demo

@@ -1,4 +1,4 @@
-"""What the demo did: how long each step took, how close the check came, which files there are."""
+"""The report of the demo: time of each step, PSNR of the check, files."""
 
 from __future__ import annotations
 
@@ -6,19 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 
 PAPER_SECONDS = 8 * 60.0
-"""What one picture through a mask took the paper (section 4.3): 500×500×20×20, Matlab, a 3 GHz PC of 2009."""
+"""Time of one image through a mask in the paper (section 4.3): 500×500×20×20, Matlab, a 3 GHz PC of 2009."""
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How long a step took.
+    """The time of a step.
 
     Args:
-        step: in words.
+        step: its name.
         first: seconds of the first run.
-        again: seconds of a second run of the same, where there was one.
-        note: what else is to be said.
-        compared: whether this is the work that took the paper 8 minutes: one picture from the full field.
+        again: seconds of a second, identical run; None without one.
+        note: a remark.
+        compared: whether this is the work that took 8 minutes in the paper: one image from the full light
+            field.
     """
 
     step: str
@@ -29,12 +30,12 @@ class Timing:
 
     @property
     def times_the_paper(self) -> float | None:
-        """How many times faster than the paper's 8 minutes; None for other work."""
+        """Speed-up over the paper's 8 minutes; None for other work."""
         return PAPER_SECONDS / self.first if self.compared else None
 
     @property
     def speed_up(self) -> str:
-        """The same as text; nothing where there is nothing to compare."""
+        """The same as text; empty for other work."""
         times = self.times_the_paper
         return "" if times is None else f"{float(f'{times:.2g}'):,.0f} ×"
 
@@ -44,12 +45,12 @@ class DemoReport:
     """The demo's result.
 
     Args:
-        folder: where everything was written.
-        files: all that was written, the page and the contact sheet first.
+        folder: of all files.
+        files: all written files, the page and the contact sheet first.
         timings: of the steps, in order.
-        psnr: decibels of the simulated pinhole picture against ``truth``, by interpolation.
-        truth: what the pinhole picture was compared with, in words.
-        light_field: what was looked at, in words.
+        psnr: decibels of the simulated pinhole image against ``truth``, by interpolation.
+        truth: description of the reference of the pinhole image.
+        light_field: description of the light field.
     """
 
     folder: Path

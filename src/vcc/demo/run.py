@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 INTERPOLATIONS: tuple[Interpolation, ...] = ("nearest", "linear", "cubic", "sharp")
 PAPER_SHAPE = (20, 20, 500, 500)
 BEHIND_MASKS = 2.0
-"""Exposure behind either mask over that without: one is half open, and the crests of the other do not clip."""
+"""Relative exposure behind masks: one mask is half open, and crests behind the other do not clip."""
 OTHER_PLACES = "sharp when focused near", "sharp at middle distance", "sharp when focused far"
-"""What close-ups of someone's own light field show."""
+"""Labels of close-ups for a light field of the user."""
 
 
 def run_demo(
@@ -48,21 +48,21 @@ def run_demo(
     small: bool = False,
     console: Console | None = None,
 ) -> DemoReport:
-    """Do the paper's two examples and its own check, and write pictures and a page that explain them.
+    """Run the paper's two examples and its own check, and write pictures and a page that explain them.
 
     Args:
-        output: the folder for pictures, ``index.html`` and ``contact-sheet.png``; made if missing.
-        light_field: a light field, a store of one, or what `vcc.open_light_field` reads, instead of the
-            built-in scene.
-        small: a smaller light field (8×8 views of 160×160 pixels; of someone's own, every second view and
+        output: the folder for pictures, ``index.html`` and ``contact-sheet.png``; created if missing.
+        light_field: a light field, a store of one, or a path that `vcc.open_light_field` reads, instead of
+            the built-in scene.
+        small: a smaller light field (8×8 views of 160×160 pixels; of the user's, every second view and
             pixel), for a quick look.
-        console: where to print progress and results; None prints to the standard output.
+        console: for progress and results; None prints to the standard output.
 
     Returns:
-        Where the files are, what each step took in seconds, and the check's PSNR in decibels.
+        The files, the time of each step in seconds, and the check's PSNR in decibels.
 
     Raises:
-        InputError: the folder cannot be made or written to, or the light field cannot be used.
+        InputError: the folder cannot be created or written to, or the light field cannot be used.
     """
     if console is None:
         from rich.console import Console
@@ -80,7 +80,7 @@ def run_demo(
 
 @dataclass(frozen=True)
 class _Taken:
-    """A picture that a camera took, how it is shown, and how long it took."""
+    """An image, its display version, and the times of two captures, seconds."""
 
     image: Image
     exposure: float
@@ -90,7 +90,7 @@ class _Taken:
 
 @dataclass
 class _Work:
-    """What has been done so far."""
+    """The state of a run of the demo."""
 
     folder: Path
     console: Console
@@ -100,7 +100,7 @@ class _Work:
     gaps: dict[str, float] = field(default_factory=dict)
 
     def path(self, name: str) -> Path:
-        """Where a file goes; it is remembered."""
+        """The path of a file, which is added to the list of files."""
         path = self.folder / name
         self.files.append(path)
         return path
@@ -111,14 +111,14 @@ class _Work:
 
     @contextmanager
     def timed(self, step: str, note: str = "") -> Iterator[None]:
-        """Remember what a step took that is done inside."""
+        """Context that records its duration as a step."""
         begun = time.perf_counter()
         yield
         self.timings.append(Timing(step, time.perf_counter() - begun, note=note))
 
     @contextmanager
     def bar(self, words: str) -> Iterator[Progress]:
-        """A progress bar; yields what to call with (done, total)."""
+        """A progress bar; yields a callback for (done, total)."""
         from rich.progress import Progress
 
         with Progress(console=self.console, transient=True) as progress:
@@ -128,10 +128,10 @@ class _Work:
     def take(
         self, bench: Bench, camera: Camera, name: str, exposure: float, interpolation: Interpolation = "sharp"
     ) -> _Taken:
-        """Capture twice, timed, and write the picture."""
+        """Capture twice, timed, and write the image."""
         seconds = []
         with warnings.catch_warnings(), self.console.status(name):
-            warnings.simplefilter("ignore", ResultWarning)  # the page says what share of the rays is missing
+            warnings.simplefilter("ignore", ResultWarning)  # the page reports the share of missing rays
             for _ in range(2):
                 begun = time.perf_counter()
                 image = camera.capture(bench.light_field, interpolation=interpolation)
@@ -160,7 +160,7 @@ def _made(folder: Path) -> Path:
 
 def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> Bench:
     begun = time.perf_counter()
-    if given is None:  # one tiny plane, so that what is timed next is not compiling
+    if given is None:  # a tiny plane, so that the next time does not include compiling
         with work.console.status("compiling"):
             tiny = PlanesScene([TexturedPlane(Uniform(), 1.0)])
             tiny.light_field((1, 1), (2, 2), spacing=1e-3, slope_per_pixel=1e-3)
@@ -185,7 +185,7 @@ def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> B
 
 
 def _warm_up(bench: Bench) -> None:
-    """Run each kind of plan once on a few views, so that what follows is not compiling."""
+    """Run each kind of plan once on a few views, so that later times do not include compiling."""
     few = few_views(bench)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResultWarning)  # most of the sensor stays dark
@@ -195,14 +195,14 @@ def _warm_up(bench: Bench) -> None:
 
 
 def kinds_of_camera(bench: Bench) -> tuple[Camera, ...]:
-    """One for each kind of plan that the demo runs."""
+    """One camera for each kind of plan that the demo runs."""
     return bench.conventional(bench.near), bench.cosine(), bench.coded()
 
 
 def few_views(bench: Bench) -> LightField:
-    """A corner of the pixels of four views.
+    """A corner of the pixels of four middle views.
 
-    Views of the middle: those of the corners lie outside the round lens, and a plan passes them over.
+    Corner views lie outside the round lens, and a plan skips them.
     """
     row, column = (n // 2 for n in bench.light_field.shape[:2])
     middle = bench.light_field[row - 1 : row + 1, column - 1 : column + 1, :8, :8]
@@ -246,7 +246,7 @@ def _draw_example_one(work: _Work, bench: Bench, taken: dict[str, _Taken]) -> No
 
 
 def _close_ups(bench: Bench, taken: dict[str, _Taken]) -> tuple[list[Crop], Sequence[str]]:
-    """Where to look closely, and what is there: known places, else what is sharp in one picture only."""
+    """The squares for close-ups and their labels: known places, or those sharp in one image only."""
     size = max(min(bench.light_field.shape[2:4]) * 13 // 100, 8)
     if bench.scene is None:
         return figures.detailed_crops([picture.shown for picture in taken.values()], size), OTHER_PLACES

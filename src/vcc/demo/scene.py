@@ -1,3 +1,3 @@
-"""The demo's scene, where it was before: the face of `vcc.showcase.scene`."""
+"""The demo's scene, re-exported from `vcc.showcase.scene` for compatibility."""
 
 from vcc.showcase.scene import demo_scene as demo_scene

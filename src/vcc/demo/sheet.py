@@ -1,4 +1,4 @@
-"""The demo's contact sheet: its pictures on one, from top to bottom."""
+"""The demo's contact sheet: its pictures on one sheet, from top to bottom."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ MASK_TITLES = {"cosine": "cosine mask near the sensor", "coded": "coded mask hal
 
 
 def truth_in_words(bench: Bench) -> str:
-    """What the pinhole picture is compared with."""
+    """A description of the reference of the pinhole image."""
     if bench.scene is not None:
         return "the scene’s closed form, traced through the pinhole at 4×4 points a pixel"
     return "a cubic spline through the view at the pinhole (no truth is known between its samples)"
 
 
 def drawn_sheet(folder: Path, bench: Bench, psnr: dict[str, float], timings: Sequence[Timing]) -> Figure:
-    """The sheet, of the pictures that lie in the folder."""
+    """The sheet of the pictures in the folder."""
     nv, nu, nt, ns = bench.light_field.shape[:4]
     whose = "a built-in scene" if bench.scene is not None else "your light field"
     decibels = ", ".join(f"{name} {value:.1f} dB" for name, value in psnr.items())
@@ -78,7 +78,7 @@ def drawn_sheet(folder: Path, bench: Bench, psnr: dict[str, float], timings: Seq
 
 
 def _compared(timings: Sequence[Timing]) -> str:
-    """How fast the first picture of those was that took the paper 8 minutes; nothing without one."""
+    """The time of the first image comparable to the paper's 8 minutes, as text; empty without one."""
     for timing in timings:
         if timing.compared:
             return f"; {duration(timing.first)} ({timing.speed_up} faster than the paper’s 8 min)"

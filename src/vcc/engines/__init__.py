@@ -1,9 +1,9 @@
-"""Engines run the cores of plans on samples; they know nothing of optics.
+"""Engines run the cores of plans on samples; they contain no optics.
 
-All of them compute the same sums (`vcc.plan.footprints.model`, `vcc.plan.rays.model`). ``reference`` is the plain
-one that defines what is correct, ``array_api`` works on arrays of PyTorch, JAX and others and carries gradients,
-``numba`` is fast on NumPy arrays, ``cuda`` works on NVIDIA's GPUs. An engine is an argument or follows from the
-arrays' type; there is no global setting.
+All engines compute the same sums (`vcc.plan.footprints.model`, `vcc.plan.rays.model`). ``reference`` is written
+plainly and defines the correct result. ``array_api`` works on arrays of PyTorch, JAX and others and carries
+their gradients. ``numba`` is fast on NumPy arrays. ``cuda`` runs on NVIDIA GPUs. The engine is an argument or
+follows from the type of the arrays; there is no global setting.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ ENGINES: dict[EngineName, tuple[str, Abilities]] = {
     "numba": ("vcc.engines.numba_cpu", Abilities(parallel=True, bands=True)),
     "cuda": ("vcc.engines.cuda", Abilities(no_learning="does not learn cameras")),
 }
-"""Where each engine is, loaded when it is first used since what it needs is slow to load, and what it can do."""
+"""Module and abilities of each engine. Modules are loaded at first use: their libraries take long to import."""
 
 
 def chosen(name: EngineName | None, values: Any) -> EngineName:
-    """An engine by its name, or by the arrays' type.
+    """The name of the engine to use: the given one, or the default for the type of the arrays.
 
     Args:
-        name: or None for the one that suits the arrays.
-        values: samples; None for those that are read from elsewhere, which are NumPy's.
+        name: name of an engine, or None for the default.
+        values: samples, or None if they are read from elsewhere (NumPy arrays then).
 
     Raises:
-        InputError: an engine that does not take arrays of this type.
+        InputError: the engine does not support arrays of this type.
     """
     of_numpy = values is None or isinstance(values, np.ndarray)
     if name is None:
@@ -56,19 +56,20 @@ def chosen(name: EngineName | None, values: Any) -> EngineName:
 
 
 def engine(name: EngineName) -> Engine:
-    """The engine of a name."""
+    """The module of the engine with this name."""
     return cast(Engine, lazy_import.module(ENGINES[name][0]))
 
 
 def abilities(name: EngineName) -> Abilities:
-    """What the engine of a name can do."""
+    """The abilities of the engine with this name."""
     return ENGINES[name][1]
 
 
 def on_gpu(values: Any) -> Any:
-    """Samples on the GPU, where engine ``"cuda"`` takes them without a copy; those that are there stay.
+    """Copy samples to the GPU, where engine ``"cuda"`` reads them directly; GPU arrays are returned unchanged.
 
     Raises:
-        InputError: numba-cuda is not installed, there is no GPU, or an array of another library in main memory.
+        InputError: numba-cuda is not installed, there is no GPU, or the array belongs to another library and is
+            in main memory.
     """
     return lazy_import.module(ENGINES["cuda"][0]).resident(values)

@@ -1,7 +1,7 @@
-"""The array-API engine: the plan as products of matrices, on arrays of any library that follows the standard.
+"""The array-API engine: the plan as matrix products, on arrays of any library that follows the standard.
 
-Gradients and GPUs come from the library. The shares along rows and columns form two banded matrices for
-each column of views (`vcc.engines.bands`); where the frame shears the pixel grid they are gathered tap by tap
+Gradients and GPU support come from the library. The shares along rows and columns are two banded matrices for
+each column of views (`vcc.engines.bands`). If the frame shears the pixel grid, shares are gathered tap by tap
 instead. The sum is linear in the samples, so its transpose is its adjoint.
 """
 
@@ -42,25 +42,25 @@ def run(
 def prepared(
     before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
 ) -> Any:
-    """Samples as a core takes them."""
+    """Samples as a core reads them."""
     for operator in before:
         values = operator.apply(values)
     return values
 
 
 def finished(after: Sequence[operators.After], raster: Any, threads: int) -> Any:
-    """The picture (rows, columns, channels), float32, of a raster."""
+    """The image (rows, columns, channels), float32, from a raster."""
     return array_namespace(raster).astype(
         operators.finished(tuple(operators.merged(after)), raster), array_namespace(raster).float32
     )
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
-    """Bytes that a run takes beside the samples and the raster, estimated: matrices of shares and a few views."""
+    """Estimated bytes of a run besides the samples and the raster: matrices of shares and a few views."""
     if isinstance(core, Rays):
         return memory_of_rays(core)
     (rows, columns), (high, wide) = core.samples, core.raster_shape
-    # Of a library without sums of bands: matrices for a column of views. Of all: its samples, twice where masked.
+    # Dense matrices for a column of views (libraries without banded sums), and its samples, twice with masks.
     taps, fine = len(core.view_rows), core.refine**2
     shares = 8 * core.refine * (taps * rows * high + columns * wide)
     return shares + 12 * channels * (taps * rows * columns * fine + columns * core.refine * high)
@@ -68,13 +68,13 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
 
 @dataclass(frozen=True)
 class _FineAxis:
-    """The samples along an axis as they are spread: divided where the plan says so.
+    """The samples along an axis, subdivided if the plan does so.
 
     Args:
-        count: how many.
-        start: index, in samples, of the first.
-        refine: finer ones for each sample.
-        division: how they are made, or None.
+        count: number of samples.
+        start: index of the first, in units of the original samples.
+        refine: finer samples per original sample.
+        division: how they are computed, or None.
     """
 
     count: int
@@ -84,7 +84,7 @@ class _FineAxis:
 
     @classmethod
     def of(cls, core: Footprints, samples: int) -> _FineAxis:
-        """Those of a core's samples along an axis."""
+        """The samples of a core along an axis."""
         if core.refine == 1:
             return cls(samples, 0.0, 1, None)
         division = core.division(samples)
@@ -92,12 +92,12 @@ class _FineAxis:
 
     @property
     def index(self) -> Array:
-        """Of each, in samples."""
+        """Index of each, in units of the original samples."""
         return self.start + np.arange(self.count) / self.refine
 
 
 def _separable_weights(mask: MaskLookup, b: int, a: int, l: Array, k: Array) -> Array:
-    """A mask at samples of a tap whose rows and columns meet it along its own: (rows, columns)."""
+    """A mask at the samples of a tap, if their rows and columns are parallel to the mask's: (rows, columns)."""
     rows, columns = mask.texture.shape
     down, across, _ = three_around(mask.row[b, a] + mask.step[1, 1] * l, rows)
     lines = Bands(down.T, across.T).of(mask.texture)
@@ -116,7 +116,7 @@ class _Run:
         self.channels = values.shape[4] if values.ndim == 5 else 1
 
     def constant(self, numbers: Any) -> Any:
-        """NumPy numbers as an array of this run's library, type and device."""
+        """NumPy values as an array of this run's library, type and device."""
         return self.xp.asarray(np.ascontiguousarray(numbers), dtype=self.float, device=self.device)
 
     def raster(self, progress: Progress | None) -> Any:
@@ -156,7 +156,7 @@ class _Run:
         return total
 
     def separable_column(self, a: int) -> Any:
-        """All taps of one column: rows of all of them mixed into the raster's, and then columns."""
+        """The sum of all taps of one column: first along rows of samples, then along columns."""
         core, xp = self.core, self.xp
         rows, columns = core.raster_shape
         used = np.flatnonzero(core.weights[:, a])
@@ -185,13 +185,13 @@ class _Run:
         return [whole[:, i, ...] for i in range(nu)]
 
     def spread(self, axis: _FineAxis, origin: Array, step: float, pixels: int) -> Taps:
-        """The shares of samples along an axis that begin at ``origin``, before they are divided."""
+        """The shares along an axis of samples that begin at ``origin``, before subdivision."""
         core, first = self.core, origin + step * axis.start
         apart = step / core.refine
         return taps(core.interpolation, first, apart, axis.count, pixels, core.opening, np.float64)
 
     def weighted_column(self, used: NDArray[np.intp], a: int, down: _FineAxis, across: _FineAxis) -> Any:
-        """The samples that taps of a column read, divided, times the masks: (taps, rows, columns, channels)."""
+        """The samples that taps of a column read, subdivided, times the masks: (taps, rows, columns, channels)."""
         block = self.divided(used, a, down, across)
         for mask in self.core.masks:
             weights = np.stack([_separable_weights(mask, b, a, down.index, across.index) for b in used])
@@ -199,7 +199,7 @@ class _Run:
         return block
 
     def divided(self, used: NDArray[np.intp], a: int, down: _FineAxis, across: _FineAxis) -> Any:
-        """The samples that taps of a column read, (taps, rows, columns, channels), divided if need be."""
+        """The samples that taps of a column read, (taps, rows, columns, channels), subdivided if required."""
         core, xp = self.core, self.xp
         where = xp.asarray(core.view_rows[used], device=self.device)
         block = xp.take(self.columns[int(core.view_columns[a])], where, axis=0)
@@ -211,13 +211,13 @@ class _Run:
         return xp.permute_dims(xp.reshape(fine, (down.count, used.size, across.count, -1)), (1, 0, 2, 3))
 
     def along_columns(self, bands: Bands, block: Any) -> Any:
-        """Columns of a block (rows, columns, channels) mixed."""
+        """Multiply the columns of a block (rows, columns, channels) by a banded matrix."""
         rows, columns, channels = block.shape
         turned = self.xp.reshape(self.xp.permute_dims(block, (1, 0, 2)), (columns, -1))
         return self.xp.permute_dims(self.xp.reshape(bands.of(turned), (-1, rows, channels)), (1, 0, 2))
 
     def sheared_column(self, a: int) -> Any:
-        """All taps of one column where rows and columns do not part: each is gathered tap by tap."""
+        """The sum of all taps of one column, gathered tap by tap, if rows and columns are sheared."""
         core, xp = self.core, self.xp
         rows, columns = core.raster_shape
         total = xp.zeros((rows, columns, self.channels), dtype=self.float, device=self.device)
@@ -237,12 +237,13 @@ class _Run:
         return total
 
     def gathered(self, block: Any, pixel: NDArray[Any], start: NDArray[Any], step: float) -> Any:
-        """block (m, n, channels) mixed along its rows: pixel (p, 1) gathers rows near it, per column n.
+        """Mix the rows of block (m, n, channels): pixel (p, 1) sums the rows near it, separately for each column
+        n.
 
         Args:
-            block: samples whose row 0 lies at pixel coordinate ``start`` (1, n), and the others ``step`` apart.
+            block: samples; row 0 lies at pixel coordinate ``start`` (1, n), the rows are ``step`` apart.
             pixel: pixel indices (p, 1).
-            start: see above.
+            start: see ``block``.
             step: pixels.
         """
         xp = self.xp

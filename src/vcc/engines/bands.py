@@ -1,7 +1,7 @@
-"""Sums of a few weighted rows each, on arrays of any library: what a matrix is that is nearly empty.
+"""Products with banded matrices: sums of a few weighted rows each, on arrays of any library.
 
-A pixel gathers a handful of samples. As a whole matrix that is a hundred times as many products as there are
-weights; here only those are formed where the arrays' library has a way to do so.
+A pixel sums a handful of samples. A dense matrix would need a hundred times as many products as there are
+weights; here only these products are computed, if the arrays' library supports it.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bands(Brief):
-    """Row m of what is made is Σₙ weights[m, n] · row index[m, n] of what is given.
+    """Row m of the result is Σₙ weights[m, n] · row index[m, n] of the input.
 
     Args:
-        index: rows taken, (rows made, entries), int64.
-        weights: of each, 0 where there is none.
+        index: input rows, (output rows, entries), int64.
+        weights: of each, 0 for unused entries.
     """
 
     index: NDArray[np.int64]
@@ -34,11 +34,11 @@ class Bands(Brief):
 
     @classmethod
     def of_taps(cls, taps: Taps, samples: int, weights: Array, begin: NDArray[np.int64]) -> Bands:
-        """All view taps' rows of samples at once, one after the other below each other.
+        """The rows of samples of all view taps, stacked below each other.
 
         Args:
-            taps: (view taps, pixels) of them.
-            samples: rows of a tap.
+            taps: their shares, (view taps, pixels).
+            samples: rows per tap.
             weights: of each tap.
             begin: the row at which each tap's samples begin.
         """
@@ -50,15 +50,15 @@ class Bands(Brief):
 
     @classmethod
     def of_division(cls, division: Division, samples: int) -> Bands:
-        """What makes finer samples of so many along an axis."""
+        """The matrix that subdivides ``samples`` samples along an axis."""
         index = division.first[:, None] + np.arange(division.shares.shape[1])
         return cls(np.minimum(index, samples - 1), division.shares)
 
     def of(self, rows: Any) -> Any:
-        """What is made of rows (n, numbers), an array of any library: (rows made, numbers), of the same type.
+        """Multiply rows (n, numbers), an array of any library: (output rows, numbers), of the same type.
 
-        In double precision where they are. By SciPy's sparse matrices of NumPy's arrays, by an embedding bag of
-        PyTorch's, which carries gradients; by a whole matrix of all others.
+        Double precision stays double. NumPy arrays use SciPy's sparse matrices; PyTorch tensors an embedding
+        bag, which carries gradients; other arrays a dense matrix.
         """
         if is_numpy_array(rows):
             return np.asarray(self._sparse(len(rows), rows.dtype) @ rows)
@@ -66,7 +66,7 @@ class Bands(Brief):
         if is_torch_array(rows):
             where = xp.asarray(self.index, device=device(rows))
             weights = xp.asarray(self.weights, dtype=rows.dtype, device=device(rows))
-            bag = sys.modules["torch"].nn.functional.embedding_bag  # who hands in tensors has loaded it
+            bag = sys.modules["torch"].nn.functional.embedding_bag  # PyTorch is loaded, as there are tensors
             return bag(where, rows, per_sample_weights=weights, mode="sum")
         whole = self._sparse(rows.shape[0], np.dtype(np.float64)).toarray()
         return xp.asarray(whole, dtype=rows.dtype, device=device(rows)) @ rows

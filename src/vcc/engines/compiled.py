@@ -1,15 +1,15 @@
-"""Functions compiled by Numba. Their machine code is kept on disk; they work where it cannot be kept, too.
+"""Functions compiled by Numba, cached on disk. They also work if they cannot be cached.
 
-Numba keeps code beside the source, or under the home folder, or where ``NUMBA_CACHE_DIR`` says, and fails where it
-can write to none of them, or where what it finds there is damaged. Here code is then read from the same places
-without being kept (a container's image may bring it along), and else compiled by each process.
+Numba caches machine code next to the source, in the home folder, or in ``NUMBA_CACHE_DIR``. It fails if it can
+write to none of them, or if the cached files are damaged. Here the code is then read from the same places
+without being cached (a container image may include it), and else compiled by each process.
 
-An index of what there is and the code itself are two files, and many processes that begin at once would write both
-in each other's way, which has crashed programs (numba issues 4807 and 10128): they take turns.
+The index of a cache and the code are separate files. Processes that start together and write both at once have
+crashed programs (numba issues 4807 and 10128): here they write one after the other, under a lock.
 
-Numba stamps kept code by the file that its function stands in. Functions that it calls, constants and types of
-other files are compiled into the same code: here the stamp covers every file of ours from which the function's
-file imports, and those from which these import.
+Numba invalidates cached code when the function's own file changes. Functions, constants and types from other
+files are compiled into the same code: here the stamp covers every file of this package that the function's file
+imports, directly or indirectly.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ except ImportError:  # Windows
     fcntl = None
 
 TURN = ".vcc.lock"
-"""The file in a folder of code that says whose turn it is."""
+"""Name of the lock file in a cache folder."""
 PATIENCE = 5.0
-"""Seconds after which nobody waits for a turn any more: some network disks have no locks that work."""
+"""Seconds after which a process stops waiting for the lock: on some network disks locks do not work."""
 
 _IMPORTED = re.compile(
     rb"^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]*(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))", re.MULTILINE
@@ -49,29 +49,29 @@ _IMPORTED = re.compile(
 """Import statements: a module and names from it, or modules."""
 
 SAMPLES = tuple(map(np.dtype, ("uint8", "uint16", "int16", "float32")))
-"""Types of samples that loops read as they are: in which light fields are kept, and what is made of 8 bits."""
+"""Types of samples that loops read without conversion: those of stored light fields and of sharpened bytes."""
 
 
 def read_as(kind: np.dtype[Any]) -> np.dtype[Any]:
-    """The type in which compiled loops read samples of a type: float32 for all that are not among `SAMPLES`.
+    """The type in which compiled loops read samples of a type: float32 unless it is in `SAMPLES`.
 
-    Half precision is unknown to them; of double precision and 32 bits they would keep no more digits, since they
-    add up in single precision, and each type takes seconds to compile.
+    Numba does not support half precision. Double precision and 32-bit integers would gain no digits, since loops
+    sum in single precision, and each type takes seconds to compile.
     """
     return kind if kind in SAMPLES else np.dtype(np.float32)
 
 
 def compiled(borrowing: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """What makes a function a compiled one, with `numba.njit`'s options; it is compiled when first called.
+    """A decorator that compiles a function at its first call, with `numba.njit`'s options.
 
     Args:
-        borrowing: it makes no arrays, and counts no references to those that its callers hold. Functions that were
-            given tuples of arrays for each pixel spent half of their time counting, in all threads alternately.
+        borrowing: the function makes no arrays, and counts no references to its arguments. Functions called with
+            tuples of arrays for each pixel spent half of their time counting, with all threads taking turns.
         options: of `numba.njit`.
     """
 
     def made(function: Callable[..., Any]) -> Any:
-        # No way for C to call it is compiled, which takes a tenth of the time.
+        # No wrapper for C is compiled, which saves a tenth of the time.
         dispatcher = njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, _nrt=not borrowing, **options)(
             function
         )
@@ -82,7 +82,7 @@ def compiled(borrowing: bool = False, **options: Any) -> Callable[[Callable[...,
 
 
 def _only_read(locator: Any) -> Any:
-    """A way of Numba's to find the folder of a function's code, for a folder that cannot be written to."""
+    """One of Numba's cache locators, for a folder that is not writable."""
     return type(locator.__name__, (locator,), {"ensure_cache_path": lambda self: None})
 
 
@@ -90,13 +90,13 @@ _Places: Any = FunctionCache._impl_class
 
 
 class _ReadableToo(_Places):  # type: ignore[misc]
-    """Where code is kept: in the first of Numba's places that can be written to, or else where it may be read."""
+    """The cache location: the first of Numba's places that is writable, or else one that is readable."""
 
     _locator_classes = (*_Places._locator_classes, *map(_only_read, _Places._locator_classes))
 
 
 class _Kept(FunctionCache):  # type: ignore[misc]
-    """The code of a function on disk: where it cannot be read or kept, the function works all the same."""
+    """The code of a function on disk; if it cannot be read or written, the function works all the same."""
 
     _impl_class = _ReadableToo
 
@@ -110,15 +110,15 @@ class _Kept(FunctionCache):  # type: ignore[misc]
         try:
             with _in_turn(self.cache_path):
                 found = super().load_overload(sig, target_context)
-        except Exception:  # cut off or damaged: compiled again
+        except Exception:  # truncated or damaged: compile again
             self._start_anew()
             return None
-        # Where there are no locks, two processes that keep code at once may give two files one name.
+        # Without locks, two processes that write at the same time may give two files one name.
         fits = found is not None and tuple(found.signature.args) == tuple(normalize_signature(sig)[0])
         return found if fits else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the code for arguments of these types, or say that it is not kept."""
+        """Cache the code for arguments of these types, or warn that it cannot be cached."""
         try:
             with _in_turn(self.cache_path):
                 super().save_overload(sig, data)
@@ -134,7 +134,7 @@ class _Kept(FunctionCache):  # type: ignore[misc]
 
 
 def _sources(module: str, file: str) -> str:
-    """A digest of all files of ours that may be compiled into a module's functions."""
+    """A digest of all files of this package that may be compiled into a module's functions."""
     ours = {
         module.partition(".")[0]: Path(file).parents[module.count(".")],
         __name__.partition(".")[0]: Path(__file__).parents[__name__.count(".")],
@@ -149,7 +149,7 @@ def _sources(module: str, file: str) -> str:
         for source in (place.with_suffix(".py"), place / "__init__.py"):
             try:
                 status = source.stat()
-            except OSError:  # what is imported is no module, or a package
+            except OSError:  # an imported name that is not a module, or a package
                 continue
             found[name], imported = _read(source, status.st_mtime_ns, status.st_size)
             ahead += imported
@@ -162,7 +162,7 @@ def _sources(module: str, file: str) -> str:
 
 @functools.cache
 def _read(source: Path, changed: int, size: int) -> tuple[bytes, tuple[str, ...]]:
-    """The digest of a file, and full names of what it imports; read again where it has changed."""
+    """The digest of a file, and full names of its imports; read again if the file has changed."""
     text = source.read_bytes()
     statements = re.sub(rb"#[^\n]*", b"", text)
     names: list[str] = []
@@ -176,22 +176,22 @@ def _read(source: Path, changed: int, size: int) -> tuple[bytes, tuple[str, ...]
 
 @contextmanager
 def _in_turn(folder: str) -> Iterator[None]:
-    """While no other process reads or keeps code in a folder, as far as the system can tell."""
+    """Hold the lock of a folder, so that no other process reads or writes code there, if locks work."""
     stream = _turn(Path(folder) / TURN)
     try:
         yield
     finally:
         if stream is not None:
-            os.close(stream)  # which lets go of the lock
+            os.close(stream)  # releases the lock
 
 
 def _turn(file: Path) -> int | None:
-    """The open file that says that it is this process's turn; None where there is no telling."""
+    """The open lock file, locked; None if it cannot be locked."""
     if fcntl is None:
         return None
     try:
         stream = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError:  # no such folder yet, or one that nobody writes to
+    except OSError:  # the folder does not exist yet, or is not writable
         return None
     until = time.monotonic() + PATIENCE
     while time.monotonic() < until:

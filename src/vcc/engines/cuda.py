@@ -1,12 +1,11 @@
-"""The engine of GPUs: footprints and rays in kernels that Numba compiles for NVIDIA's, with samples where they
-are.
+"""The GPU engine: footprints and rays in kernels that Numba compiles for NVIDIA GPUs.
 
-Samples of NumPy are sent to the GPU piece by piece while others are summed there; samples that are on the GPU
-already (`vcc.LightField.on_gpu`, PyTorch's CUDA tensors, CuPy's arrays) are taken without a copy, and pictures of
-PyTorch's and CuPy's stay there. What stands before and after a plan's core is done by the processor's engine for
-NumPy, and by the arrays' own library else.
+NumPy samples are sent to the GPU piece by piece while earlier pieces are summed there. Samples that are on the
+GPU already (`vcc.LightField.on_gpu`, CUDA tensors of PyTorch, CuPy arrays) are read without a copy; images from
+PyTorch and CuPy samples stay on the GPU. Operators before and after a plan's core run on the CPU engine for
+NumPy, else in the arrays' own library.
 
-Loading this module is refused where there is no GPU, with what to do.
+Importing this module without a GPU raises an error that says what to do.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ cuda_arrays.check_gpu()
 
 
 def resident(values: Any) -> Any:
-    """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
+    """Copy samples to the GPU; GPU arrays are returned unchanged.
 
     Raises:
         InputError: arrays of another library in main memory.
@@ -75,13 +74,12 @@ def back(
     threads: int,
     progress: Progress | None = None,
 ) -> Gradient:
-    """What a raster's weights say of samples, float32 in their library, and of textures of masks, weights and
-    scale.
+    """Gradients of a weighted raster to samples (float32, in their library), mask textures, weights and scale.
 
     See `vcc.plan.protocol.Engine`.
 
     Raises:
-        InputError: rays; a number to which there is no derivative, or none by this engine.
+        InputError: the core is rays; a parameter has no derivative, or none with this engine.
     """
     if isinstance(core, Rays):
         raise InputError("engine 'cuda' does not go backwards through rays: use engine='numba', with NumPy arrays")
@@ -99,10 +97,10 @@ def back(
 def prepared(
     before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
 ) -> Any:
-    """Samples as a core takes them: of NumPy as `vcc.engines.numba_cpu` has them, else by their own library.
+    """Samples as a core reads them: NumPy arrays by `vcc.engines.numba_cpu`, others by their own library.
 
     Raises:
-        InputError: what is done before the core to samples that no library but Numba knows.
+        InputError: an operator that is not supported for samples kept by `on_gpu`.
     """
     if isinstance(values, np.ndarray):
         return numba_cpu.prepared(before, values, threads)
@@ -126,14 +124,14 @@ prepared_back = numba_cpu.prepared_back
 
 
 def finished(after: Sequence[operators.After], raster: Any, threads: int) -> Any:
-    """The picture (rows, columns, channels), float32, of a raster, in its library."""
+    """The image (rows, columns, channels), float32, from a raster, in its library."""
     if isinstance(raster, np.ndarray):
         return numba_cpu.finished(after, raster, threads)
     return operators.finished(list(operators.merged(after)), raster)
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
-    """Bytes of main memory that a run takes beside the samples and the raster, estimated: two pinned pieces."""
+    """Estimated bytes of main memory that a run needs besides the samples and the raster: two pinned buffers."""
     return 2 * cuda_footprints.SENT_AT_ONCE
 
 
@@ -141,12 +139,12 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
 
 
 def traced(core: Rays, values: Any, beside: int, progress: Progress | None = None) -> Partial:
-    """The raster by one round of rays, in the library of the samples.
+    """The raster from one round of rays, in the library of the samples.
 
     Args:
-        core: what is traced.
-        values: samples (v, u, t, s[, channels]), of NumPy (which are sent as a whole) or on the GPU.
-        beside: 0, or 1 for the blocks of points beside those of the first round.
+        core: the rays to trace.
+        values: samples (v, u, t, s[, channels]), NumPy (sent as a whole) or on the GPU.
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
         progress: called with (done, total).
     """
     tell(progress, 0, 1)
@@ -157,7 +155,7 @@ def traced(core: Rays, values: Any, beside: int, progress: Progress | None = Non
 
 
 def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
-    """The pictures of `vcc.engines.ray_loops.add_pixels`, and the rays of each column of pixels, on the GPU."""
+    """The images of `vcc.engines.ray_loops.add_pixels`, and the rays of each column of pixels, on the GPU."""
     there = arranged(taken(cuda_arrays.resident(values)))
     rows, columns = core.raster_shape
     channels = there.shape[4]
@@ -176,15 +174,14 @@ def traced_on_gpu(core: Rays, values: Any, beside: int) -> tuple[Any, Any]:
 _last_used = LastUsed(lambda core: tuple(map(to_device_all, given(core, 0))))
 
 
-# --- views sharpened, for samples that are kept there; see `vcc.plan.operators.SharpenViews` ---
+# --- sharpening, for samples kept on the GPU; see `vcc.plan.operators.SharpenViews` ---
 
 LEFT = 2 * WEIGHT_DIGITS - KEPT_DIGITS
-"""Binary digits by which sums of whole numbers are rounded off."""
+"""Number of binary digits that are rounded off integer sums."""
 
 
 def sharpened(operator: SharpenViews, values: Any) -> Any:
-    """Samples (v, u, t, s[, channels]), Numba's, sharpened: 8 bits as whole numbers of 16 bits, exactly; else
-    float32."""
+    """Sharpen Numba samples (v, u, t, s[, channels]) on the GPU: uint8 gives int16, exactly; else float32."""
     there = arranged(values)
     nv, nu, nt, ns, channels = there.shape
     exact = there.dtype == np.uint8
@@ -195,8 +192,7 @@ def sharpened(operator: SharpenViews, values: Any) -> Any:
 
 @cuda.jit
 def _exactly(values, weights, made):  # type: ignore[no-untyped-def]
-    """made = values filtered by whole numbers along k and along l, rounded once; beyond borders the last ones go
-    on."""
+    """made = values filtered with integers along k and l, rounded once; border samples are repeated."""
     x, y, z = cuda.grid(3)
     wide, high, deep = cuda.gridsize(3)
     nv, nu, nt, ns, channels = values.shape
@@ -217,7 +213,7 @@ def _exactly(values, weights, made):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def _in_floats(values, weights, made):  # type: ignore[no-untyped-def]
-    """The same in single precision, not rounded."""
+    """As `_exactly`, in single precision without rounding."""
     x, y, z = cuda.grid(3)
     wide, high, deep = cuda.gridsize(3)
     nv, nu, nt, ns, channels = values.shape

@@ -1,11 +1,10 @@
-"""Arrays on the GPU: how they get there and back, and how kernels are started on them.
+"""Arrays on the GPU: copies in both directions, and launching kernels on them.
 
-The one module that imports CUDA for Python: others take ``cuda`` and the types of numbers from here, so that a
-successor of numba-cuda is a matter of one line.
+The only module that imports CUDA for Python: other modules take ``cuda`` and the number types from here, so that
+replacing numba-cuda changes one line.
 
-Samples come as NumPy arrays, which are copied, or as arrays that are on the GPU already (PyTorch's, CuPy's,
-Numba's: all that have the CUDA array interface), which are taken where they are. What is made of them goes back to
-the library that they came from.
+NumPy samples are copied to the GPU. Arrays with the CUDA array interface (PyTorch, CuPy, Numba) are used in
+place. Results are returned in the library of the samples.
 """
 
 from __future__ import annotations
@@ -34,24 +33,24 @@ from vcc.base.errors import InputError
 from vcc.fields.sampled import library_of
 
 THREADS = 128
-"""Of a block, side by side along memory: four warps, each of which reads one piece of memory. Small blocks leave
-few multiprocessors without work at a launch's end, and no kernel here shares anything between the threads of a
+"""Threads per block, along memory: four warps, each of which reads one piece of memory. Small blocks leave few
+multiprocessors idle at the end of a launch, and no kernel here shares anything between the threads of a
 block."""
 FEWEST_BLOCKS = 128
-"""Of a launch. Numba warns of fewer, since most of a GPU is idle then; what is small here is meant to be small,
-and blocks without work end at once."""
+"""Least number of blocks per launch. Numba warns about fewer, since most of a GPU is idle then. Small launches are
+intended here, and blocks without work end at once."""
 KEPT = 4
-"""Plans whose tables stay on each GPU: those that were used last."""
+"""Number of plans whose tables stay on each GPU: those used last."""
 DEFAULT_STREAM = 0
-"""In which kernels run on samples that are on the GPU already."""
+"""Stream of kernels on samples that are on the GPU already."""
 MOST_BLOCKS = 65535
-"""Along the second and the third axis of a launch; what is beyond is done by the same threads, later."""
+"""Largest number of blocks along the second and third axis of a launch; the threads process the rest later."""
 SIMULATED = bool(config.ENABLE_CUDASIM)
 """Whether kernels run as Python on the processor, for tests (``NUMBA_ENABLE_CUDASIM=1``)."""
 
 
 def check_gpu() -> None:
-    """Refuse a machine on which kernels cannot run.
+    """Raise an error on a machine that cannot run kernels.
 
     Raises:
         InputError: numba-cuda is not installed, or there is no GPU that it can use.
@@ -73,19 +72,18 @@ def check_gpu() -> None:
 
 
 def launch(kernel: Any, threads: tuple[int, ...], stream: Any, *arguments: Any) -> None:
-    """Start a kernel on so many places.
+    """Launch a kernel on a grid of places.
 
     Args:
-        kernel: takes places by `cuda.grid` and goes on by `cuda.gridsize`, so that any launch does all of the
-            work.
-        threads: how many places there are along x (along memory), y and z.
-        stream: in which it is started.
+        kernel: a grid-stride kernel (`cuda.grid`, `cuda.gridsize`), so that any launch does all of the work.
+        threads: number of places along x (along memory), y and z.
+        stream: to launch it in.
         arguments: of the kernel.
     """
     x, y, z = (*threads, 1, 1)[:3]
     if min(x, y, z) < 1:
         return
-    # In the simulator a thread of Python stands for each of the GPU's: a few do all places, in two blocks.
+    # In the simulator each GPU thread is a Python thread: a few of them do all places, in two blocks.
     wide = 2 if SIMULATED else THREADS
     blocks = (2, 1, min(z, 2)) if SIMULATED else _blocks(math.ceil(x / wide), y, z)
     kernel[blocks, (wide, 1, 1), stream](*arguments)
@@ -98,17 +96,17 @@ def _blocks(x: int, y: int, z: int) -> tuple[int, int, int]:
 
 @contextmanager
 def in_turn_with(values: Any) -> Iterator[None]:
-    """Work on the GPU on which samples lie: what their library has started before comes first, and what it starts
-    afterwards waits for this.
+    """Work on the samples' GPU, ordered with the work of their library: after its earlier and before its later
+    work.
 
-    PyTorch and CuPy start their work in a current stream of their own, which neither waits for the default stream
-    nor is waited for by it.
+    PyTorch and CuPy launch work in a current stream of their own, which is not synchronised with the default
+    stream.
 
     Args:
         values: samples, of any library.
 
     Raises:
-        InputError: what `is_on_gpu` refuses.
+        InputError: see `is_on_gpu`.
     """
     library = library_of(values) if is_on_gpu(values) else ""
     if library == "torch":
@@ -129,7 +127,7 @@ def in_turn_with(values: Any) -> Iterator[None]:
 
 
 def wait_for(one: Any, other: Any) -> None:
-    """What is started in another stream from now on waits for what was started in one."""
+    """Let later work in stream ``other`` wait for earlier work in stream ``one``."""
     if one != other:
         reached = cuda.event()
         reached.record(one)
@@ -137,7 +135,7 @@ def wait_for(one: Any, other: Any) -> None:
 
 
 def this_gpu() -> int:
-    """The number of the GPU that kernels run on now."""
+    """The number of the current GPU."""
     return 0 if SIMULATED else int(cuda.get_current_device().id)
 
 
@@ -147,14 +145,14 @@ def to_device(array: NDArray[Any], stream: Any = 0) -> Any:
 
 
 def to_device_all(given: Any) -> Any:
-    """A named tuple, and those in it, with copies on the GPU of the arrays."""
+    """Copy the arrays of a named tuple, and of nested ones, to the GPU."""
     if isinstance(given, np.ndarray):
         return to_device(given)
     return type(given)(*map(to_device_all, given)) if hasattr(given, "_fields") else given
 
 
 def brought(array: Any, stream: Any = 0) -> NDArray[Any]:
-    """A copy in main memory, of what has been started in a stream before."""
+    """A copy in main memory, after the earlier work in the stream."""
     made: NDArray[Any] = array.copy_to_host(stream=stream)
     if stream:
         stream.synchronize()
@@ -162,18 +160,18 @@ def brought(array: Any, stream: Any = 0) -> NDArray[Any]:
 
 
 def zeros(shape: tuple[int, ...], stream: Any = 0) -> Any:
-    """New numbers on the GPU, float32."""
+    """An array of zeros on the GPU, float32."""
     made = cuda.device_array(math.prod(shape), np.float32, stream=stream)
     launch(_set_to_zero, made.shape, stream, made)
     return made.reshape(shape)
 
 
 def is_on_gpu(values: Any) -> bool:
-    """Whether samples are on the GPU already, rather than in an array of NumPy.
+    """Whether samples are on the GPU already; False for NumPy arrays.
 
     Raises:
-        InputError: a tensor that carries gradients, which this engine would leave behind; an array of another
-            library in main memory, with what to do.
+        InputError: a tensor with gradients, which this engine does not carry, or an array of another library in
+            main memory.
     """
     if isinstance(values, np.ndarray):
         return False
@@ -191,7 +189,7 @@ def is_on_gpu(values: Any) -> bool:
 
 
 def taken(values: Any) -> Any:
-    """Samples on the GPU as an array of Numba's, where they lie.
+    """Samples on the GPU as a Numba array, without a copy.
 
     Raises:
         InputError: samples in half precision.
@@ -203,10 +201,10 @@ def taken(values: Any) -> Any:
 
 
 def resident(values: Any) -> Any:
-    """Samples on the GPU: NumPy's are copied there, those that are there stay as they are.
+    """Copy NumPy samples to the GPU; GPU arrays are returned unchanged.
 
     Raises:
-        InputError: what `is_on_gpu` refuses.
+        InputError: see `is_on_gpu`.
     """
     if is_on_gpu(values):
         return values
@@ -214,16 +212,16 @@ def resident(values: Any) -> Any:
 
 
 def is_of_numba(values: Any) -> bool:
-    """Whether an array is one of Numba's own on the GPU, which no other library computes with."""
+    """Whether an array is Numba's own on the GPU; no other library computes with these."""
     return type(values).__module__.startswith("numba")
 
 
 def arranged(values: Any, swapped: bool = False) -> Any:
-    """Samples on the GPU, (v, u, t, s, channels), in one piece of memory; where they are so, not copied.
+    """Samples on the GPU, (v, u, t, s, channels), contiguous; not copied if they are already.
 
     Args:
-        values: Numba's, (v, u, t, s[, channels]).
-        swapped: whether rows and columns of pixels change places.
+        values: a Numba array, (v, u, t, s[, channels]).
+        swapped: whether to swap rows and columns of pixels.
     """
     nv, nu, nt, ns = values.shape[:4]
     shape = (nv, nu, *((ns, nt) if swapped else (nt, ns)), *values.shape[4:], *(1,) * (5 - len(values.shape)))
@@ -235,13 +233,13 @@ def arranged(values: Any, swapped: bool = False) -> Any:
 
 
 def swapped(values: Any) -> Any:
-    """Samples on the GPU, (v, u, t, s[, channels]), with rows and columns of pixels in each other's place."""
+    """Samples on the GPU, (v, u, t, s[, channels]), with rows and columns of pixels swapped."""
     made = arranged(values, swapped=True)
     return made if len(values.shape) == 5 else made.reshape(made.shape[:4])
 
 
 def given_back(array: Any, like: Any) -> Any:
-    """What was made on the GPU, in the library that the samples came from: on the GPU where it computes there.
+    """Convert a GPU array to the library of the samples; it stays on the GPU for PyTorch and CuPy.
 
     Args:
         array: on the GPU.
@@ -256,18 +254,18 @@ def given_back(array: Any, like: Any) -> Any:
 
 
 def device(function: Any) -> Any:
-    """One of the processor's compiled functions as a part of kernels, put in where it is called."""
+    """A compiled function of the CPU as a device function for kernels, inlined."""
     plain = getattr(function, "py_func", function)
     return plain if SIMULATED else cuda.jit(device=True, forceinline=True)(plain)
 
 
 class LastUsed:
-    """What was made, on each GPU, of the plans' cores that were used last.
+    """A cache of GPU data for the cores used last, per GPU.
 
-    A core's arrays are never written to: cores that share all of them are alike, but for what a sample stands for.
+    A core's arrays are never written to: cores that share all arrays are equal, except for ``scale``.
 
     Args:
-        make: makes it of a core.
+        make: computes the data of a core.
     """
 
     def __init__(self, make: Callable[[Any], Any]) -> None:
@@ -276,13 +274,13 @@ class LastUsed:
         self._lock = Lock()
 
     def of(self, core: Any) -> Any:
-        """What is on this GPU of a core, or is made now."""
+        """The data of a core on this GPU, from the cache or computed now."""
         with self._lock:
             here = self._kept.setdefault(this_gpu(), deque(maxlen=KEPT))
             for n, (known, made) in enumerate(here):
                 if _alike(known, core):
                     del here[n]
-                    here.append((known, made))  # the one used last is given up last
+                    here.append((known, made))  # the least recently used entry is dropped first
                     return made
             made = self.make(core)
             here.append((core, made))
@@ -290,13 +288,13 @@ class LastUsed:
 
 
 def _alike(one: Any, other: Any) -> bool:
-    """Whether two cores are, by what they hold rather than by its content."""
+    """Whether two cores are equal, except for ``scale``, comparing arrays by identity."""
     pairs = ((getattr(one, each.name), getattr(other, each.name)) for each in fields(one) if each.name != "scale")
     return type(one) is type(other) and all(a is b or _equal(a, b) for a, b in pairs)
 
 
 def _equal(one: Any, other: Any) -> bool:
-    """Whether two parts of cores are equal that can be told so without looking at arrays."""
+    """Whether two fields are equal, without comparing the content of arrays."""
     plain = (str, int, float, bool)
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(_equal, one, other))

@@ -1,5 +1,6 @@
-"""Footprints on the GPU, backwards: from the weights of a raster to samples, to masks' textures and views'
-weights."""
+"""The backward pass of footprints on the GPU: from the weights of a raster to samples, mask textures and view
+weights.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +23,8 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import Taps
 
 PARTS = 8
-"""Of the rows of view taps, whose sums for a mask's texture are made side by side: small textures have too few
-points to keep a GPU busy."""
+"""Number of groups of rows of view taps whose sums for a mask's texture are computed in parallel: small textures
+have too few points to keep a GPU busy."""
 
 Array = NDArray[np.float64]
 
@@ -31,22 +32,22 @@ Array = NDArray[np.float64]
 def samples_back(
     core: Footprints, values: Any, raster: NDArray[np.floating], progress: Progress | None = None
 ) -> Any:
-    """The derivative of ⟨raster, what footprints make of samples⟩ to the samples, float32, in their library.
+    """The derivative of ⟨raster, raster of the samples⟩ to the samples, float32, in their library.
 
     Args:
         core: the footprints.
-        values: samples, of which only the shape is looked at.
+        values: samples; only their shape is used.
         raster: weights of the raster's values, (rows, columns, channels).
         progress: called with (done, total) in view taps.
     """
-    is_on_gpu(values)  # or refused
+    is_on_gpu(values)  # raises an error for unsupported arrays
     return given_back(samples_back_on_gpu(core, tuple(values.shape), raster, progress), values)
 
 
 def samples_back_on_gpu(
     core: Footprints, shape: tuple[int, ...], raster: Any, progress: Progress | None = None
 ) -> Any:
-    """The same on the GPU, for samples of a shape; weights may be there, too, float32."""
+    """As `samples_back`, on the GPU, from the shape of the samples; weights may be on the GPU, too, float32."""
     tables, channels = tables_of(core), raster.shape[2]
     back = _Back(tables, raster)
     gradient = zeros(shape)
@@ -69,10 +70,10 @@ def samples_back_on_gpu(
 
 
 def check_known(core: Footprints, wanted: Collection[str]) -> None:
-    """Refuse numbers to which this engine has no derivative.
+    """Raise an error for parameters to which this engine has no derivative.
 
     Raises:
-        InputError: other numbers than masks' textures, weights of views and the scale.
+        InputError: a parameter other than mask textures, weights of views and the scale.
     """
     core.check_wanted(wanted)
     for name in wanted:
@@ -91,15 +92,15 @@ def footprint_gradients(
     progress: Progress | None = None,
     threads: int = 1,
 ) -> dict[str, Array]:
-    """The derivative of ⟨raster, the raster of the samples⟩ to some of the core's numbers, float64.
+    """The derivative of ⟨raster, raster of the samples⟩ to some of the core's parameters, float64.
 
     Args:
         core: the footprints.
-        values: the samples, of NumPy or on the GPU.
+        values: the samples, NumPy or on the GPU.
         raster: weights of the raster's values, (rows, columns, channels).
-        wanted: names of masks' textures, ``weights`` and ``scale``.
+        wanted: names of mask textures, ``weights`` and ``scale``.
         progress: called with (done, total) in view taps.
-        threads: that fill pieces of samples in main memory.
+        threads: number of threads that fill pieces of samples in main memory.
     """
     tables = tables_of(core)
     back = _Back(tables, raster)
@@ -126,11 +127,11 @@ def footprint_gradients(
 
 
 class _Back:
-    """A raster's weights on the GPU, and what they say.
+    """A raster's weights on the GPU, and gradients from them.
 
     Args:
         tables: of the footprints.
-        raster: weights, (rows, columns, channels), of NumPy or on the GPU, float32.
+        raster: weights, (rows, columns, channels), NumPy, or float32 on the GPU.
     """
 
     def __init__(self, tables: Tables, raster: Any) -> None:
@@ -151,14 +152,14 @@ class _Back:
         shape: tuple[int, ...],
         gradient: Any,
     ) -> None:
-        """Fill in what some columns of views get.
+        """Add the gradients of the samples in some columns of views.
 
         Args:
             columns: of view taps, sorted by the column of views that they read.
-            ends: where those of one column of views end, with 0 before.
+            ends: where the taps of each column of views end, preceded by 0.
             views: the columns of views.
             shape: of the samples.
-            gradient: of them, on the GPU.
+            gradient: of the samples, on the GPU.
         """
         tables, fine, channels = self.tables, self.fine, self.channels
         nv, nu, nt, ns = shape[:4]
@@ -208,12 +209,12 @@ class _Back:
 
     @property
     def _spread(self) -> tuple[Any, Any]:
-        """(first, shares) of the rows of the raster that a row of samples falls on; of columns likewise."""
+        """(first, shares) of the rows of the raster that a row of samples falls on; the same for columns."""
         return self.tables.once("spread", lambda: tuple(map(_on_pixels, axes(self.core, self.fine))))  # type: ignore[no-any-return]
 
     @property
     def _undivided(self) -> tuple[Any, Any]:
-        """(first, shares) of the finer rows that are made of a row of samples; of columns likewise."""
+        """(first, shares) of the finer rows made from a row of samples; the same for columns."""
 
         def made() -> Any:
             assert self.fine.divided_as is not None
@@ -225,17 +226,17 @@ class _Back:
 
         return self.tables.once("undivided", made)  # type: ignore[no-any-return]
 
-    # --- to numbers ---
+    # --- to parameters ---
 
     def source(self, piece: Piece, opened: bool) -> Source:
-        """The samples of a piece, divided if need be; opened: those of closed taps, too."""
+        """The samples of a piece, subdivided if required; opened: also those of taps with a weight of zero."""
         if self.tables.divided is None:
             return piece.source
         used = to_device(np.ones(self.core.weights.shape, np.float32)) if opened else self.tables.weights
         return divided(self.tables, piece, self.channels, used)
 
     def agreeing(self, piece: Piece, source: Source, left_out: int) -> Any:
-        """How each sample agrees with the raster's weights, through all masks but one, in a room of the tables."""
+        """Products of samples with the raster's weights, through all masks but one, in a buffer of the tables."""
         tables, fine = self.tables, self.fine
         columns = piece.stop - piece.start
         products = tables.buffer("products", (columns, len(self.core.view_rows), fine.rows, fine.columns))

@@ -1,8 +1,8 @@
-"""Kernels of footprints for the GPU, backwards: from the weights of a raster to samples and to masks.
+"""Kernels of footprints for the GPU, backward: from the weights of a raster to samples and to masks.
 
-Forward kernels turned around, and all of them gather as well: a thread makes one sample's sum, or that of one
-point of a mask's texture, from all that it weighs in. Where rows and columns part, the raster's weights are mixed
-across once for each column of view taps, into the columns of its samples (`mix_back`).
+They transpose the forward kernels, and all of them gather: a thread computes the sum of one sample, or of one
+point of a mask's texture, from all values that it contributes to. For separable rows and columns, the raster's
+weights are mixed across once for each column of view taps, into the columns of its samples (`mix_back`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from vcc.engines.numba_kernels import farthest, share_at
 
 
 class Readers(NamedTuple):
-    """The view taps of a piece, by the views that they read.
+    """The view taps of a piece, sorted by the views that they read.
 
     Args:
         rows: int64, rows of taps; those that read the n-th row of views end before ``row_ends[n + 1]``.
         row_ends: (rows of views + 1,) int64.
-        columns: int64, columns of taps likewise, as many as are mixed.
+        columns: int64, columns of taps, likewise; one for each mixed raster.
         column_ends: (columns of views in the piece + 1,) int64.
     """
 
@@ -36,8 +36,8 @@ class Readers(NamedTuple):
 
 
 class Target(NamedTuple):
-    """Where samples' derivatives go: row l of view (v, n-th column of the piece) begins at begin[v] + further[n] +
-    l · pitch.
+    """Where to write samples' gradients: row l of view (v, n-th column of the piece) begins at begin[v] +
+    further[n] + l · pitch.
 
     Args:
         values: flat, float32.
@@ -52,18 +52,18 @@ class Target(NamedTuple):
     pitch: int
 
 
-# --- where rows and columns part ---
+# --- separable rows and columns ---
 
 
 @cache
 def mix_back(width: int) -> Any:
-    """The kernel that mixes a raster's weights across, for samples that fall on so many pixels."""
+    """The kernel that mixes a raster's weights across, for samples that fall on ``width`` pixels."""
 
     @cuda.jit
     def kernel(raster, columns, first, shares, channels, mixed):  # type: ignore[no-untyped-def]
         """mixed[p, y, k · channels + c] = Σ share · raster[y, x · channels + c] over the x that sample k falls on.
 
-        raster: (rows, columns · channels). columns: which column of view taps each p is. first: (columns of taps,
+        raster: (rows, columns · channels). columns: the column of view taps of each p. first: (columns of taps,
         columns of samples). shares: (columns of taps, columns of samples, width), zero beyond the raster.
         """
         x, y, z = cuda.grid(3)
@@ -84,18 +84,18 @@ def mix_back(width: int) -> Any:
 
 @cache
 def rows_back(values_each: int, masked: bool, width: int) -> Any:
-    """The kernel that gives samples what the rows of the raster say that they fall on.
+    """The kernel that sums, for each sample, the rows of the mixed raster on which it falls.
 
     Args:
-        values_each: values of a row that a thread makes side by side: the channels of a sample, where it is
-            weighed by masks, else one.
+        values_each: neighbouring values of a row that a thread computes: the channels of a sample if masks weigh
+            it, else one.
         masked: whether there are masks.
         width: rows of the raster that a row of samples falls on.
     """
 
     @cuda.jit
     def kernel(mixed, weights, scale, first, shares, masks, readers, target):  # type: ignore[no-untyped-def]
-        """Each sample of each view: Σ over the taps that read it of weight · masks · Σ share · mixed.
+        """Gradient of each sample of each view: Σ over the taps that read it of weight · masks · Σ share · mixed.
 
         mixed: see `mix_back`. weights: (rows of taps, columns of taps). first: (rows of taps, rows of samples).
         shares: (rows of taps, rows of samples, width). masks: `MaskRows`. readers: `Readers`. target: `Target`.
@@ -135,7 +135,7 @@ def rows_back(values_each: int, masked: bool, width: int) -> Any:
 
 @cache
 def met_in_rows(channels: int) -> Any:
-    """The kernel that says how samples of so many channels agree with what the raster says of them."""
+    """The kernel of products of samples with the raster's weights on their footprints."""
 
     @cuda.jit
     def kernel(source, mixed, first, shares, places, grid, masks, left_out, start, products):  # type: ignore[no-untyped-def]
@@ -171,7 +171,7 @@ def met_in_rows(channels: int) -> Any:
     return kernel
 
 
-# --- where they do not ---
+# --- sheared rows and columns ---
 
 
 @cuda.jit(device=True)
@@ -199,7 +199,7 @@ def meet(raster, places, grid, footprint, b, a, m, n, part):  # type: ignore[no-
 
 @cache
 def sheared_back(channels: int) -> Any:
-    """As `rows_back` where rows and columns do not part."""
+    """As `rows_back`, for sheared rows and columns."""
 
     @cuda.jit
     def kernel(raster, weights, scale, places, grid, footprint, masks, rows, readers, target):  # type: ignore[no-untyped-def]
@@ -237,7 +237,7 @@ def sheared_back(channels: int) -> Any:
 
 @cache
 def met_sheared(channels: int) -> Any:
-    """As `met_in_rows` where rows and columns do not part."""
+    """As `met_in_rows`, for sheared rows and columns."""
 
     @cuda.jit
     def kernel(source, raster, places, grid, footprint, masks, left_out, start, products):  # type: ignore[no-untyped-def]
@@ -261,12 +261,12 @@ def met_sheared(channels: int) -> Any:
     return kernel
 
 
-# --- samples that were divided ---
+# --- subdivided samples ---
 
 
 @cuda.jit
 def give_back(fine, down, across, channels, target):  # type: ignore[no-untyped-def]
-    """Each sample of a view gets what its finer ones were given: the transpose of `divide`.
+    """Sum the gradients of finer samples into the samples of a view: the transpose of `divide`.
 
     fine: (columns of views, rows of views, finer rows, finer columns · channels). down, across: (first, shares) of
     finer rows and columns by sample. target: `Target`.
@@ -291,7 +291,7 @@ def give_back(fine, down, across, channels, target):  # type: ignore[no-untyped-
                 target.values[target.begin[v] + target.further[n] + l * target.pitch + to] = total
 
 
-# --- numbers ---
+# --- parameters ---
 
 
 @cuda.jit
@@ -311,8 +311,7 @@ def sum_lines(products, lines):  # type: ignore[no-untyped-def]
 
 @cuda.jit(device=True)
 def within(rest, step, point, reach, count):  # type: ignore[no-untyped-def]
-    """(first, after the last) n of so many for which rest + step · n lies no farther than ``reach`` from a
-    point."""
+    """(first, after the last) n of 0 … count − 1 for which rest + step · n is at most ``reach`` from a point."""
     if abs(step) < 1e-12:
         return np.int64(0), count if abs(rest - point) <= reach else np.int64(0)
     return around((point - rest) / step, reach / abs(step), count)
@@ -320,7 +319,7 @@ def within(rest, step, point, reach, count):  # type: ignore[no-untyped-def]
 
 @cuda.jit(device=True)
 def counted(place, point):  # type: ignore[no-untyped-def]
-    """What a point of a line counts for a place on it, see `vcc.base.lookup.three_around`."""
+    """Weight of a point of a line at a place on the line, see `vcc.base.lookup.three_around`."""
     middle = math.floor(place + 0.5)
     off, away = place - middle, point - middle
     if away == 0:
@@ -338,7 +337,7 @@ def texture_back(products, weights, places, grid, step, m, start, texture):  # t
     point (r, c).
 
     products: (columns of taps, rows of taps, rows of samples, columns of samples). step: (masks, 2, 2).
-    texture: (parts, rows, columns), sums that are put together afterwards.
+    texture: (parts, rows, columns), sums that are added up afterwards.
     """
     x, y, z = cuda.grid(3)
     wide, high, deep = cuda.gridsize(3)
@@ -346,7 +345,7 @@ def texture_back(products, weights, places, grid, step, m, start, texture):  # t
     parts = texture.shape[0]
     along_k, along_l = step[m, 0, 0], step[m, 0, 1]  # columns of the texture
     down_k, down_l = step[m, 1, 0], step[m, 1, 1]
-    # How far a row of samples spreads over rows and over columns of the texture, from its middle.
+    # Largest distance of a row of samples from its middle, along rows and columns of the texture.
     half = (samples - 1) / grid.refine / 2
     loose, reach = abs(down_k) * half, 1.5 + 1e-6
     for i in range(z, parts, deep):

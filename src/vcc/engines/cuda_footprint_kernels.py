@@ -1,10 +1,10 @@
-"""Kernels of footprints for the GPU, forward: every thread makes sums of its own, so that nobody waits or adds to
-what another adds to, and the same bytes come out of every run.
+"""Kernels of footprints for the GPU, forward. Every thread computes its own sums: threads do not wait for each
+other or add to the same values, and every run gives the same bytes.
 
-Where rows and columns part, the way is that of `vcc.engines.numba_kernels`: all views of a column of view taps are
-summed row by row in the columns of the samples, four rows of the raster at a time (a sample is read, converted and
-weighed once for all four), and the sums are mixed across once for each column. Neighbouring threads read
-neighbouring values of a row of samples. Else each pixel gathers what falls on it.
+Separable rows and columns follow `vcc.engines.numba_kernels`: all views of a column of view taps are summed row
+by row in the columns of the samples, four rows of the raster at a time (a sample is read, converted and weighed
+once for all four). The sums are then mixed across once for each column. Neighbouring threads read neighbouring
+values of a row of samples. Without separable rows and columns, each pixel sums the samples that fall on it.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from vcc.engines.interpolation import dark_outside, three_around
 from vcc.engines.numba_kernels import farthest, share_at
 
 ROWS = 4
-"""Rows of the raster that a thread sums at once."""
+"""Number of raster rows that a thread sums together."""
 DARK = 3
-"""Dark lines beside a mask's: so many that none is asked for beyond them."""
+"""Number of dark lines on each side of a mask: kernels read none beyond them."""
 
 
 class Quads(NamedTuple):
-    """Which rows of samples four rows of the raster gather, one under another.
+    """The rows of samples that four consecutive rows of the raster sum.
 
     Args:
         first: (rows of taps, raster rows / 4) int32, the first row of samples.
-        counts: likewise, how many.
-        shares: flat float32, in the order (rows of taps, raster rows / 4, most, 4), what each of the four takes of
-            each of them.
+        counts: likewise, number of rows.
+        shares: flat float32, in the order (rows of taps, raster rows / 4, most, 4), share of each row of samples
+            in each of the four raster rows.
     """
 
     first: NDArray[np.int32]
@@ -45,7 +45,7 @@ class Source(NamedTuple):
     """Samples on the GPU: row l of view tap (b, a) begins at begin[b] + further[a] + l · pitch.
 
     Args:
-        values: flat; of bytes taken by fours, words of 32 bits.
+        values: flat; 32-bit words if bytes are read in fours.
         begin: (rows of taps,) int64.
         further: (columns of taps,) int64.
         pitch: values in a row.
@@ -58,15 +58,15 @@ class Source(NamedTuple):
 
 
 class MaskRows(NamedTuple):
-    """Masks where rows and columns part: rows of their textures at the columns of samples, and who takes which.
+    """Masks for separable rows and columns: rows of their textures at the columns of samples, and lookup tables.
 
     Args:
-        lines: flat float32, one line after the other, of each mask `DARK` dark ones before its rows and after.
+        lines: flat float32, line after line; each mask has `DARK` dark lines before its rows and after them.
         width: values in a line: columns of samples.
         begin: (masks, rows of taps, columns of taps) int32: the line of the mask's row 0.
-        near: (masks, rows of taps, columns of taps, rows of samples) int32, the mask's row nearest to a sample's,
-            at most two outside.
-        off: likewise float32, how far the sample's is from there, in rows.
+        near: (masks, rows of taps, columns of taps, rows of samples) int32, the mask row nearest to each row of
+            samples, at most two rows outside.
+        off: likewise float32, distance of the row of samples from it, in mask rows.
     """
 
     lines: NDArray[np.float32]
@@ -77,11 +77,11 @@ class MaskRows(NamedTuple):
 
 
 class MaskGroups(NamedTuple):
-    """View taps that look a mask up in the same columns, so that they share its lines.
+    """View taps that sample a mask at the same columns and share its lines.
 
     Args:
-        mask: (groups,) int32, its number.
-        column: (groups,) float64, of its texture at the first column of samples.
+        mask: (groups,) int32, number of the mask.
+        column: (groups,) float64, texture column of the first column of samples.
         begin: (groups,) int64, where the group's lines begin.
     """
 
@@ -91,7 +91,7 @@ class MaskGroups(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where sample (0, 0) of each view tap falls, before division.
+    """Where sample (0, 0) of each view tap falls, before subdivision.
 
     Args:
         x: (rows of taps, columns of taps), raster column.
@@ -104,7 +104,7 @@ class Places(NamedTuple):
     masks: NDArray[np.float64]
 
 
-# --- where rows and columns part ---
+# --- separable rows and columns ---
 
 
 @cache
@@ -112,11 +112,11 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
     """The kernel that sums views row by row, for rows of samples of one layout.
 
     Args:
-        values_each: values of a row that a thread sums side by side: the channels of a sample, where it is weighed
-            by masks, or the bytes of a word.
-        words: whether samples are bytes that are read as words of 32 bits, four at once.
+        values_each: neighbouring values of a row that a thread sums: the channels of a sample if masks weigh it,
+            or the bytes of a word.
+        words: whether samples are bytes that are read as 32-bit words, four at a time.
         masked: whether there are masks.
-        batch: rows of samples that are asked for at once, before the first is used: memory answers late.
+        batch: rows of samples loaded before the first is used, because of the latency of memory.
     """
 
     @cuda.jit
@@ -152,7 +152,7 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
                         for t in range(0, quads.counts[b, quad], batch):
                             shares = np.uint64(((b * quads.first.shape[1] + quad) * most + t) * ROWS)
                             for j in range(batch):
-                                # Beyond what is counted shares are zero, and any row will do.
+                                # Beyond the counted rows shares are zero: read any existing row.
                                 l = uint32(min(first + t + j, rows - 1))
                                 at = begin + np.uint64(l * pitch)
                                 if words:
@@ -183,7 +183,7 @@ def sum_rows(values_each: int, words: bool, masked: bool, batch: int) -> Any:
 
 @cuda.jit(device=True)
 def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
-    """What mask m lets pass at sample (k, l) of view tap (b, a); see `vcc.engines.interpolation.three_around`."""
+    """Transmission of mask m at sample (k, l) of view tap (b, a); see `vcc.engines.interpolation.three_around`."""
     width = uint32(masks.width)
     line, off, half = uint32(masks.begin[m, b, a] + masks.near[m, b, a, l]), masks.off[m, b, a, l], float32(0.5)
     at = np.uint64(line * width) + np.uint64(k)
@@ -194,9 +194,9 @@ def mask_at(masks, m, b, a, l, k):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def mask_places(row, step, rows, near, off):  # type: ignore[no-untyped-def]
-    """`MaskRows.near` and ``off`` of the mask rows of sample row 0, (masks, rows of taps, columns of taps).
+    """`MaskRows.near` and ``off`` from the mask rows of sample row 0, (masks, rows of taps, columns of taps).
 
-    step: (masks,), mask rows from one row of samples to the next. rows: (masks,), how many a mask has.
+    step: (masks,), mask rows from one row of samples to the next. rows: (masks,), number of rows of each mask.
     """
     x, y, z = cuda.grid(3)
     wide, high, deep = cuda.gridsize(3)
@@ -240,7 +240,7 @@ def mask_lines(masks, groups, refine, width, lines):  # type: ignore[no-untyped-
 
 @cache
 def mix_columns(width: int) -> Any:
-    """The kernel that mixes sums across, for pixels that gather so many samples."""
+    """The kernel that mixes sums across, for pixels that sum ``width`` samples."""
 
     @cuda.jit
     def kernel(sums, first, shares, channels, start, scale, raster):  # type: ignore[no-untyped-def]
@@ -265,14 +265,14 @@ def mix_columns(width: int) -> Any:
     return kernel
 
 
-# --- samples divided into finer ones ---
+# --- subdivided samples ---
 
 
 @cuda.jit
 def divide(source, used, down, across, channels, start, fine):  # type: ignore[no-untyped-def]
     """fine[a − start, b, l, k · channels + c] = the finer samples of the view that each tap reads.
 
-    source: `Source`. used: (rows of taps, columns of taps), 0 of those that are left out. down, across: (first,
+    source: `Source`. used: (rows of taps, columns of taps), 0 for taps that are left out. down, across: (first,
     shares), see `vcc.plan.footprints.shares.Division`.
     """
     x, y, z = cuda.grid(3)
@@ -299,12 +299,12 @@ def divide(source, used, down, across, channels, start, fine):  # type: ignore[n
                 fine[column, b, l, to] = total
 
 
-# --- where rows and columns do not part ---
+# --- sheared rows and columns ---
 
 
 @cache
 def gather(channels: int) -> Any:
-    """The kernel by which each pixel of so many channels gathers what falls on it."""
+    """The kernel with which each pixel sums the samples that fall on it, for this number of channels."""
 
     @cuda.jit
     def kernel(source, weights, places, grid, footprint, masks, size, start, stop, scale, raster):  # type: ignore[no-untyped-def]
@@ -312,7 +312,7 @@ def gather(channels: int) -> Any:
         samples.
 
         source: `Source`. weights: (rows of taps, columns of taps). places: `Places`. grid, footprint, masks: see
-        `vcc.engines.footprint_tables`. size: (rows, columns) of the samples of a view, divided if need be.
+        `vcc.engines.footprint_tables`. size: (rows, columns) of the samples of a view, after subdivision.
         """
         x0, y0 = cuda.grid(2)
         wide, high = cuda.gridsize(2)
@@ -357,13 +357,13 @@ def gather(channels: int) -> Any:
 
 @cuda.jit(device=True)
 def around(middle, reach, count):  # type: ignore[no-untyped-def]
-    """(first, after the last) of so many, counted from 0, that lie no farther from a place than ``reach``."""
+    """(first, after the last) of the numbers 0 … count − 1 that are at most ``reach`` from a place."""
     return max(np.int64(math.ceil(middle - reach)), 0), min(np.int64(math.floor(middle + reach)) + 1, count)
 
 
 @cuda.jit(device=True)
 def passed(masks, places, b, a, k, l, left_out):  # type: ignore[no-untyped-def]
-    """What all masks but one let pass at sample (k, l) of view tap (b, a); masks: `Textures`."""
+    """Transmission of all masks but one at sample (k, l) of view tap (b, a); masks: `Textures`."""
     textures, size, step = masks
     through = float32(1)
     for m in range(places.masks.shape[0]):

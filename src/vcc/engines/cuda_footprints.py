@@ -1,8 +1,8 @@
-"""Footprints on the GPU, forward: samples piece by piece, and the kernels that are started for each.
+"""Footprints on the GPU, forward: samples piece by piece, and the kernel launches for each piece.
 
-A piece is some columns of view taps. Samples that are on the GPU are taken where they lie; those in main memory
-are copied there piece by piece through two places of pinned memory, in a stream of their own, so that a piece is
-on its way while the one before is summed.
+A piece is some columns of view taps. Samples on the GPU are read in place. Samples in main memory are copied to
+the GPU piece by piece, through two buffers of pinned memory and in a separate stream, so that a piece is copied
+while the piece before it is summed.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ from vcc.engines.cuda_tables import Tables, mask_rows, tables_of
 from vcc.plan.footprints.model import Footprints
 
 ROOM = 2**28
-"""Bytes of the GPU's memory that sums of a piece may take, finer samples and lines of masks among them."""
+"""Limit, in bytes, of the GPU memory for sums of a piece, including finer samples and lines of masks."""
 SENT_AT_ONCE = 2**25
-"""Bytes of samples that are sent to the GPU at once: enough for the full speed of the way there."""
+"""Bytes of samples sent to the GPU at a time: enough for the full transfer rate."""
 
 
 COPYING = 4
-"""Threads that fill a piece of pinned memory, at most: more are no faster than memory."""
+"""Largest number of threads that fill a pinned buffer: more would be limited by memory."""
 
 
 def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = None, threads: int = 1) -> Any:
@@ -50,9 +50,9 @@ def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = Non
 
     Args:
         core: the footprints.
-        values: samples (v, u, t, s[, channels]), of NumPy or on the GPU.
+        values: samples (v, u, t, s[, channels]), NumPy or on the GPU.
         progress: called with (done, total) in view taps.
-        threads: that fill pieces of samples in main memory.
+        threads: number of threads that fill pieces of samples in main memory.
     """
     channels = values.shape[4] if len(values.shape) == 5 else 1
     tables, done = tables_of(core), 0
@@ -68,7 +68,7 @@ def raster_on_gpu(core: Footprints, values: Any, progress: Progress | None = Non
 
 
 def raster_of(core: Footprints, values: Any, progress: Progress | None = None, threads: int = 1) -> Any:
-    """The same in the library of the samples."""
+    """As `raster_on_gpu`, in the library of the samples."""
     return given_back(raster_on_gpu(core, values, progress, threads), values)
 
 
@@ -77,13 +77,13 @@ def raster_of(core: Footprints, values: Any, progress: Progress | None = None, t
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Piece(Brief):
-    """Samples that some columns of view taps read.
+    """Samples for some columns of view taps.
 
     Args:
         source: on the GPU.
         start: the first column of taps.
         stop: after the last.
-        stream: in which kernels are started.
+        stream: for kernels on the piece.
     """
 
     source: kernels.Source
@@ -93,14 +93,14 @@ class Piece(Brief):
 
 
 class Pieces:
-    """The samples of a light field in pieces; within ``with``, which waits for the GPU at its end.
+    """The samples of a light field in pieces, as a context manager that waits for the GPU at its end.
 
     Args:
-        tables: of what reads them.
+        tables: of the plan that reads the samples.
         values: (v, u, t, s[, channels]).
-        more: bytes of the GPU's memory that a column of view taps takes beside those of the tables.
-        opened: whether columns count in which no tap lets light through.
-        threads: that copy samples to pinned memory.
+        more: bytes of GPU memory that a column of view taps needs besides the tables.
+        opened: whether to include columns in which all taps have a weight of zero.
+        threads: number of threads that copy samples to pinned memory.
     """
 
     def __init__(self, tables: Tables, values: Any, more: int = 0, opened: bool = False, threads: int = 1) -> None:
@@ -128,7 +128,7 @@ class Pieces:
             self.pool.__exit__(*error)
             self.copying.synchronize()
             self.stream.synchronize()
-            if error[0] is None:  # else a thread may still be filling them
+            if error[0] is None:  # else a thread may still be writing to them
                 _keep(self.places)
 
     def _there(self, spans: list[tuple[int, int]]) -> Iterator[Piece]:
@@ -148,7 +148,7 @@ class Pieces:
             place.left(self.stream)
 
     def _source(self, values: Any, first: int, span: tuple[int, ...]) -> kernels.Source:
-        """Samples on the GPU from a column of views on; span: of taps that read them, where not all do."""
+        """Samples on the GPU from a column of views on; span: the taps that read them, or () for all."""
         _, nu, nt, ns, channels = values.shape
         view = nt * ns * channels
 
@@ -161,7 +161,7 @@ class Pieces:
 
 
 class _Place:
-    """Pinned memory, and as much on the GPU, through which pieces are sent one after the other."""
+    """A buffer of pinned memory and one of equal size on the GPU, through which pieces are sent one by one."""
 
     def __init__(self) -> None:
         self.pinned = np.zeros(0, np.uint8)
@@ -169,17 +169,17 @@ class _Place:
         self.free = cuda.event()
 
     def filled(self, part: NDArray[Any], pool: Workers, copying: Any, working: Any) -> Any:
-        """A piece of samples on the GPU, once kernels that are started in ``working`` from now on see it.
+        """Copy a piece of samples to the GPU; later kernels in stream ``working`` wait for it.
 
         Args:
             part: samples (v, u, t, s, channels) in main memory.
-            pool: whose threads copy them.
-            copying: the stream in which they are sent.
-            working: that in which they are summed.
+            pool: threads that copy them.
+            copying: stream of the transfer.
+            working: stream of the sums.
         """
         kind = np.dtype(np.float32) if part.dtype == np.float16 else part.dtype
         size = part.size * kind.itemsize
-        self.free.synchronize()  # what was here before is summed
+        self.free.synchronize()  # the piece before is summed
         if self.pinned.size < size:
             self.pinned, self.there = cuda.pinned_array(size, np.uint8), cuda.device_array(size, np.uint8)
         pinned = self.pinned[:size].view(kind).reshape(part.shape)
@@ -190,12 +190,12 @@ class _Place:
         return there.view(kind).reshape(part.shape)
 
     def left(self, working: Any) -> None:
-        """All kernels that look here are started."""
+        """Mark that all kernels that read the buffer are launched."""
         self.free.record(working)
 
 
 _kept: dict[int, tuple[_Place, _Place]] = {}
-"""Two places on each GPU, from run to run: to pin memory takes longer than to send what fits into it."""
+"""Two buffers on each GPU, reused from run to run: pinning memory takes longer than a transfer through it."""
 
 
 def _free_places() -> tuple[_Place, _Place]:
@@ -203,7 +203,7 @@ def _free_places() -> tuple[_Place, _Place]:
 
 
 def _keep(places: tuple[_Place, _Place]) -> None:
-    """They are free again; of several pairs, from runs at one time, one is kept."""
+    """Store the buffers for the next run; of several pairs, from concurrent runs, one is kept."""
     _kept[this_gpu()] = places
 
 
@@ -211,14 +211,14 @@ def _keep(places: tuple[_Place, _Place]) -> None:
 
 
 class _Run:
-    """A raster as it grows."""
+    """A raster while it is summed."""
 
     def __init__(self, tables: Tables, scale: float, channels: int, stream: Any) -> None:
         self.tables, self.scale, self.channels = tables, np.float32(scale), channels
         self.raster = zeros((*tables.core.raster_shape, channels), stream)
 
     def add(self, piece: Piece) -> None:
-        """Add what some columns of view taps read."""
+        """Add the samples of some columns of view taps."""
         source = piece.source
         if self.tables.divided is not None:
             source = divided(self.tables, piece, self.channels, self.tables.weights)
@@ -264,7 +264,7 @@ class _Run:
 
 
 def _in_words(source: kernels.Source, core: Footprints) -> bool:
-    """Whether all rows of samples begin at a whole word and end at one."""
+    """Whether all rows of samples begin and end at a word boundary."""
     view = source.pitch * core.samples[0]
     aligned = _address(source.values) % 4 == 0
     return aligned and source.pitch % 4 == 0 and view % 4 == 0 and source.values.size % 4 == 0
@@ -275,7 +275,7 @@ def _address(values: Any) -> int:
 
 
 def divided(tables: Tables, piece: Piece, channels: int, used: Any) -> kernels.Source:
-    """The finer samples of each view tap of a piece, by themselves."""
+    """The finer samples of each view tap of a piece, in a buffer of their own."""
     assert tables.divided is not None
     core, fine = tables.core, tables.fine
     line, count = fine.columns * channels, len(core.view_rows)

@@ -1,9 +1,9 @@
-"""The kernel of rays for the GPU: a thread traces all rays of a pixel, by the functions of the processor's kernel.
+"""The ray kernel for the GPU: a thread traces all rays of a pixel, with the functions of the CPU kernel.
 
-Those take packets of rays; here a packet holds one. What is aimed, met and drawn is `vcc.engines.ray_aims` and
-`vcc.engines.ray_steps` word for word; only the light field is looked up by other words, without vector
-instructions. A thread adds what its rays find in their order, so that nobody waits, and the same bytes come out of
-every run.
+These functions take packets of rays; here a packet has one ray. Aiming, steps and drawing are exactly those of
+`vcc.engines.ray_aims` and `vcc.engines.ray_steps`; only the lookup in the light field differs, without vector
+instructions. A thread adds the results of its rays in order: threads do not wait for each other, and every run
+gives the same bytes.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from vcc.engines.cuda_arrays import cuda, device, float32, float64, int64
 from vcc.engines.ray_tables import Drawn, Packet, Samples
 
 FLUSHED = 256
-"""Rays that are added in single precision, as many as a packet has on the processor; their sums in double."""
+"""Rays summed in single precision, as many as in a packet on the CPU; these sums are added in double precision."""
 CELLS = 256
-"""Cells through which a pixel is traced, at most: as on the processor."""
+"""Largest number of cells through which a pixel is traced, as on the CPU."""
 
 _at_pixel = device(ray_aims.at_pixel)
 _through_window = device(ray_aims.through_window)
@@ -33,19 +33,19 @@ _may_find_light = device(ray_lookup.may_find_light)
 
 @cache
 def trace(channels: int, by_cell: bool) -> Any:
-    """The kernel that traces rays of a camera, for light fields of so many channels.
+    """The kernel that traces rays of a camera, for light fields with this number of channels.
 
     Args:
-        channels: numbers a sample.
+        channels: values per sample.
         by_cell: whether rays are aimed through the cells of an array.
     """
 
     @cuda.jit
     def kernel(field, sensor, points, aim, steps, pictures, tallies):  # type: ignore[no-untyped-def]
-        """As `vcc.engines.ray_loops.add_pixels`, of which the arguments are, for all pixels.
+        """As `vcc.engines.ray_loops.add_pixels`, with its arguments, for all pixels.
 
-        pictures: (2, rows, columns, channels): what the two halves of a pixel's rays find.
-        tallies: (rows, columns), how many they are.
+        pictures: (2, rows, columns, channels): the sums of the two halves of a pixel's rays.
+        tallies: (rows, columns), number of rays.
         """
         x0, y0 = cuda.grid(2)
         wide, high = cuda.gridsize(2)
@@ -95,7 +95,7 @@ def trace(channels: int, by_cell: bool) -> Any:
 
 @cuda.jit(device=True)
 def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
-    """Add what a ray finds to ``found`` (channels), as `vcc.engines.ray_lookup.add_rays` does for many."""
+    """Add a ray's interpolated sample to ``found`` (channels); `vcc.engines.ray_lookup.add_rays` for one ray."""
     _, _, index_from_ray, motion, between = field
     _, views, channels = samples
     nv, nu, nt, ns = views
@@ -125,7 +125,7 @@ def look_up(field, samples, rays, found):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def put_together(halves):  # type: ignore[no-untyped-def]
-    """Of the two halves, (2, numbers), their sum and twice their difference."""
+    """Replace two halves, (2, numbers), by their sum and twice their difference."""
     for n in range(cuda.grid(1), halves.shape[1], cuda.gridsize(1)):
         one, two = halves[0, n], halves[1, n]
         halves[0, n] = one + two
@@ -134,7 +134,7 @@ def put_together(halves):  # type: ignore[no-untyped-def]
 
 @cuda.jit
 def count(tallies, of_columns):  # type: ignore[no-untyped-def]
-    """How many rays the pixels of a column have: neighbouring threads read neighbouring pixels."""
+    """The number of rays of each column of pixels: neighbouring threads read neighbouring pixels."""
     for column in range(cuda.grid(1), tallies.shape[1], cuda.gridsize(1)):
         total = int64(0)
         for row in range(tallies.shape[0]):

@@ -1,4 +1,4 @@
-"""What a plan of footprints says, as arrays on the GPU: tables that stay there while their plan is used."""
+"""A plan of footprints as arrays on the GPU: tables that stay there while the plan is used."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from vcc.engines.footprint_samples import FineGrid, on_raster, taps_along, textu
 from vcc.plan.footprints.model import Footprints
 
 AT_ONCE = 6
-"""Rows of samples that a thread asks for at once, at most: memory answers after some hundred instructions. Where
-samples are as large as pixels, four rows of the raster gather six."""
+"""Largest number of rows of samples that a thread loads at a time, as a load takes some hundred instructions. If
+samples are as large as pixels, four rows of the raster sum six rows of samples."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,18 +28,18 @@ class Tables(Brief):
     """A plan on the GPU.
 
     Args:
-        core: the plan's.
-        fine: how its samples are divided.
+        core: of the plan.
+        fine: the subdivision of its samples.
         weights: (rows of taps, columns of taps) float32.
         divided: (first, shares) of rows and of columns of finer samples, or None.
-        along: where rows and columns part: `kernels.Quads` of rows and how many are asked for at once, and (first,
-            shares) of columns; or None.
+        along: for separable rows and columns: `kernels.Quads` of rows with the number of rows loaded at a time,
+            and (first, shares) of columns; else None.
         places: of samples on the raster and on masks.
-        grid: how samples lie there.
+        grid: positions of samples there.
         footprint: of a sample.
-        textures: the masks'.
-        kept: what else was made for it, see `once`.
-        lock: held by who uses its rooms.
+        textures: of the masks.
+        kept: other data made for the plan, see `once`.
+        lock: to hold while the buffers are in use.
     """
 
     core: Footprints
@@ -55,20 +55,20 @@ class Tables(Brief):
     lock: Any = field(default_factory=Lock)
 
     def once(self, key: Any, make: Callable[[], Any]) -> Any:
-        """What ``make`` makes, made once."""
+        """The result of ``make``, which is called once per key."""
         if key not in self.kept:
             self.kept[key] = make()
         return self.kept[key]
 
     def buffer(self, name: str, shape: tuple[int, ...]) -> Any:
-        """Room for float32 numbers, the same from run to run: new memory takes longer than many a kernel."""
+        """A buffer of float32 numbers, reused from run to run: allocating takes longer than many kernels."""
         size, known = math.prod(shape), self.kept.get(name)
         if known is None or known.size < size:
             known = self.kept[name] = cuda.device_array(size, np.float32)
         return known[:size].reshape(shape)
 
     def bytes_a_column(self, channels: int) -> int:
-        """Of the GPU's memory that a column of view taps takes beside its samples."""
+        """Bytes of GPU memory that a column of view taps needs besides its samples."""
         core, line = self.core, 4 * self.fine.columns * channels
         finer = len(core.view_rows) * self.fine.rows * line if self.divided else 0
         if self.along is None:
@@ -78,7 +78,7 @@ class Tables(Brief):
 
 
 def tables_of(core: Footprints) -> Tables:
-    """The tables of a plan: made now, or those that are on the GPU already."""
+    """The tables of a plan, from the cache on the GPU or made now."""
     return _last_used.of(core)  # type: ignore[no-any-return]
 
 
@@ -112,7 +112,7 @@ _last_used = LastUsed(_made)
 
 
 def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int], tuple[Any, Any]]:
-    """How rows of the raster gather rows of samples, by fours, and columns columns."""
+    """The rows of samples that rows of the raster sum, in fours, and the same for columns one by one."""
     down, across = taps_along(core, fine)
     *quads, batch = _quads(down.first, down.weights)
     return (kernels.Quads(*map(to_device, quads)), batch), (
@@ -124,8 +124,8 @@ def _along(core: Footprints, fine: FineGrid) -> tuple[tuple[kernels.Quads, int],
 def _quads(
     first: NDArray[np.int64], shares: NDArray[np.float32]
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float32], int]:
-    """`kernels.Quads` of the rows of samples that each row of the raster gathers, and how many are asked for at
-    once.
+    """`kernels.Quads` of the rows of samples that rows of the raster sum, and the number of rows to load at a
+    time.
 
     Args:
         first: see `vcc.plan.footprints.shares.Taps`, (taps, rows).
@@ -152,7 +152,7 @@ def _quads(
 
 
 def mask_rows(tables: Tables, columns: tuple[int, ...], stream: Any) -> kernels.MaskRows:
-    """The masks' textures at the columns of samples that some columns of view taps read."""
+    """The masks' textures at the columns of samples read by some columns of view taps."""
     core, width = tables.core, tables.fine.columns
     near, off = tables.once("mask rows", lambda: _mask_places(tables))
     groups, total, begin = tables.once(("masks", columns), lambda: _mask_groups(tables, columns))
@@ -178,10 +178,10 @@ def _mask_places(tables: Tables) -> tuple[Any, Any]:
 
 
 def _mask_groups(tables: Tables, columns: tuple[int, ...]) -> tuple[kernels.MaskGroups, int, Any]:
-    """Which lines of masks columns of view taps need, how many that are, and `kernels.MaskRows.begin`.
+    """The lines of masks for some columns of view taps, their number, and `kernels.MaskRows.begin`.
 
-    Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: lines are made once for
-    all taps that agree.
+    Most taps of a column sample a mask at the same columns; taps of cut cells do not. Lines are made once for
+    all taps with equal columns.
     """
     core = tables.core
     begin = np.zeros((len(core.masks), *core.weights.shape), np.int32)

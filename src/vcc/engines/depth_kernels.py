@@ -1,9 +1,9 @@
-"""The compiled loop that looks at a scene from between its views: rays marched through disparity maps.
+"""The compiled loop that renders a scene from between its views: rays marched through disparity maps.
 
-What is at pixel (k, l) of a view and has the disparity d is at (k + d·a, l + e(d)·b) of the view that is a columns
-and b rows of views before it. So a pixel of a picture in between is found in a view by going along that line, from
-the nearest disparity to the farthest, until the view's own map of disparities is met: the first surface met hides
-all others. Where the line passes from a far thing behind a near one, the view does not show what is there.
+A point at pixel (k, l) of a view with disparity d is at (k + d·a, l + e(d)·b) of the view that is a columns and
+b rows of views before it. So a pixel of an image in between is found in a view by following this line, from the
+nearest disparity to the farthest, until it meets the view's disparity map: the first surface hides all others.
+If the line passes from a far object behind a near one, the view does not show the point.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from vcc.engines.interpolation import around, bilinear
 _compiled = compiled(fastmath={"contract", "nsz"})
 
 TILE = 8
-"""Pixels a side of the squares whose ranges of disparities bound the marches."""
+"""Side, in pixels, of the squares whose ranges of disparities bound the marches."""
 MET = 0.1
-"""Of a pixel per view: a map is met where it and the march differ by less."""
+"""In pixels per view: a march meets a map if they differ by less."""
 TIE = 1e-6
-"""Of a pixel: what differs by less is half way between two."""
+"""In pixels: places that differ by less from the middle between two pixels are in the middle."""
 SAME_SURFACE = 2
-"""Tears by which pixels two apart may differ and still show one surface."""
+"""Largest difference, in tears, between pixels two apart that show one surface."""
 HALVINGS = 6
-"""Of a step of at most a pixel, to find which two pixels a tear lies between."""
+"""Number of bisections of a step of at most a pixel, to find the two pixels around a tear."""
 
 
 @_compiled
 def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
-    """A map between its pixels: linear, but the nearest pixel's where it tears; ends go on."""
+    """A map between its pixels: linear, or the nearest pixel's value at a tear; clamped to the border."""
     c, d, fx = around(x, nearness.shape[1])
     r, q, fy = around(y, nearness.shape[0])
     p00, p01, p10, p11 = nearness[r, c], nearness[r, d], nearness[q, c], nearness[q, d]
     if max(max(p00, p01), max(p10, p11)) - min(min(p00, p01), min(p10, p11)) > tear:
-        # Half way between two pixels the nearer surface, so that mirrored maps are met alike.
+        # In the middle between two pixels, use the nearer surface: mirrored maps then give mirrored results.
         upper = p00 if fx < 0.5 - TIE else (p01 if fx > 0.5 + TIE else max(p00, p01))
         lower = p10 if fx < 0.5 - TIE else (p11 if fx > 0.5 + TIE else max(p10, p11))
         return upper if fy < 0.5 - TIE else (lower if fy > 0.5 + TIE else max(upper, lower))
@@ -59,7 +59,7 @@ def _taps(f):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
-    """Add what a view shows at a place between its pixels, cubic; ends go on."""
+    """Add a view's value between its pixels, by cubic interpolation; clamped to the border."""
     rows, columns, channels = view.shape
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
@@ -88,7 +88,7 @@ def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type: ignore[no-untyped-def]
-    """`_add_colour` where other surfaces may be close: pixels nearer than ``nearer`` do not count."""
+    """As `_add_colour` close to other surfaces: pixels nearer than ``nearer`` are left out."""
     rows, columns, channels = view.shape
     x = min(max(x, 0.0), columns - 1.0)
     y = min(max(y, 0.0), rows - 1.0)
@@ -101,7 +101,7 @@ def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type:
         _add_colour(view, x, y, weight, out)
         return
     across, down = _taps(np.float32(x - c)), _taps(np.float32(y - r))
-    # The closest pixel that is not nearer stands for those that are.
+    # The closest pixel that is not nearer replaces pixels that are.
     own_row, own_column, closest = int(y + 0.5), int(x + 0.5), np.inf
     for row in range(max(r - 1, 0), min(r + 3, rows)):
         for column in range(max(c - 1, 0), min(c + 3, columns)):
@@ -121,14 +121,14 @@ def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type:
 
 @_compiled
 def _beyond(nearness, march, k, l, w):  # type: ignore[no-untyped-def]
-    """How much nearer than w a map is where a march from (k, l) that has come to w is."""
+    """How much nearer than w the map is at the place that a march from (k, l) has reached at w."""
     x, y = _place(march.way, k, l, w)
     return _surface(nearness, x, y, march.tear) - w
 
 
 @_compiled
 def _place(way, k, l, w):  # type: ignore[no-untyped-def]
-    """Where what is seen at (k, l) and has the nearness w is in a view; way: `Way`."""
+    """The place in a view of a point at (k, l) with nearness w; way: `Way`."""
     n0, n1, m0, m1 = way.along_v
     d = way.sign * w
     return k + d * way.columns, l + (n0 + n1 * d) / (m0 + m1 * d) * way.rows
@@ -136,13 +136,13 @@ def _place(way, k, l, w):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
-    """(whether a surface is met, how far the march came, the nearness of what is there, and beyond a tear).
+    """(whether a surface is met, nearness reached by the march, nearness of the surface, nearness beyond a tear).
 
-    The march from pixel (k, l) goes from the nearness ``high`` down to ``low``; march: `March`. At a tear no
-    surface is met: the march stops on its far side, short of its near side.
+    The march from pixel (k, l) goes from nearness ``high`` down to ``low``; march: `March`. At a tear no surface
+    is met: the march stops on its far side, before its near side.
     """
     if high - low < march.tear:
-        # One smooth surface is met once, and going where it would be if it were even leads there.
+        # A smooth surface is met once: two fixed-point steps reach it.
         w = 0.5 * (high + low)
         w += _beyond(nearness, march, k, l, w)
         w += _beyond(nearness, march, k, l, w)
@@ -160,8 +160,8 @@ def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
         if n < steps - 1:
             w0, f0 = w1, f1
     if f1 < 0:
-        return True, w1, w1, w1  # by rounding: nothing is farther
-    # Between the two the map is met: soon where it is smooth, at a tear never.
+        return True, w1, w1, w1  # due to rounding: nothing is farther
+    # The map is met between the two: soon if it is smooth, never at a tear.
     for n in range(2 + HALVINGS):
         w = w0 + (w1 - w0) * (f0 / (f0 - f1) if n < 2 else 0.5)
         f = _beyond(nearness, march, k, l, w)
@@ -176,15 +176,15 @@ def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
 
 @_compiled
 def look_from_between(view, bounds, march, weight, torn_only, found):  # type: ignore[no-untyped-def]
-    """Rows of the picture from a place between views, as one view shows them.
+    """Rows of the image from a place between views, rendered from one view.
 
     Args:
         view: `View`.
-        bounds: (tiles, tiles, 2), what marches from the pixels of a tile may meet, see `march_bounds`.
+        bounds: (tiles, tiles, 2), nearness that marches from the pixels of a tile may meet, see `march_bounds`.
         march: `March`.
-        weight: of what is added where ``torn_only``; else 1.
-        torn_only: only pixels that have not been seen are looked for, and only what fits their far side.
-        found: `Found`, is filled, or with ``torn_only`` added to.
+        weight: of added values if ``torn_only``; else 1.
+        torn_only: process only pixels that are still unseen, and add only values that fit their far side.
+        found: `Found`, filled; added to if ``torn_only``.
     """
     samples, nearness, _ = view
     first, out, seen, far, near = found
@@ -206,7 +206,7 @@ def look_from_between(view, bounds, march, weight, torn_only, found):  # type: i
                     _add_colour(samples, x, y, np.float32(1), out[row, k])
                 else:
                     _add_colour_beside_tear(samples, nearness, x, y, nearer, np.float32(1), out[row, k])
-            # Of what other views show, that which lies on the far side of the tear.
+            # From other views, use only values on the far side of the tear.
             elif shown and abs(here - far[row, k]) <= abs(here - near[row, k]):
                 if seen[row, k] == -1:
                     out[row, k, :] = 0
@@ -240,7 +240,7 @@ def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
     for r in range(down):
         for c in range(across):
             low, high = lowest, highest
-            for _ in range(2):  # what they may meet bounds how far they go
+            for _ in range(2):  # the nearness that marches may meet bounds how far they go
                 (xa, ya), (xb, yb) = _place(way, 0, 0, low), _place(way, 0, 0, high)
                 x0, x1, y0, y1 = min(xa, xb), max(xa, xb), min(ya, yb), max(ya, yb)
                 first_c = min(max(math.floor(c + x0 / TILE), 0), across - 1)
@@ -255,7 +255,7 @@ def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
 
 @_compiled
 def share_out(out, seen):  # type: ignore[no-untyped-def]
-    """Divide what several views were added to by their weights; returns how many pixels no view shows."""
+    """Divide sums over several views by their weights; return the number of pixels that no view shows."""
     unseen = 0
     for row in range(out.shape[0]):
         for k in range(out.shape[1]):

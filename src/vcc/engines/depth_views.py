@@ -1,13 +1,13 @@
-"""Views between views, made when they are asked for: each looks at the scene through the maps of its neighbours.
+"""Views between views, rendered on demand from the disparity maps of neighbouring views.
 
-A picture in between is made of the view nearest to it: a ray marches through that view's map of disparities until
-it meets a surface (`vcc.engines.depth_kernels`), and takes the colour that the view shows there, by cubic
-interpolation. What a near thing hides from that view is taken from the other views around, as far as they show it,
-by their nearness in views; what none of them shows goes on as the far side's border. Occlusion is thus that of the
-maps, and for given maps each picture is linear in the samples.
+An image in between is rendered from the view nearest to it. A ray marches through that view's disparity map
+until it meets a surface (`vcc.engines.depth_kernels`), and takes the colour of the view there, by cubic
+interpolation. Places that a near object hides from this view are taken from the other views around that show
+them, weighted by their distance in views. Places that no view shows continue the border of the far side. So
+occlusion follows the maps, and for given maps each image is linear in the samples.
 
-(Marching through height fields: Policarpo, Oliveira and Comba 2005. Views as warped neighbours with what they lack
-filled from others: Chen and Williams 1993.)
+(Marching through height fields: Policarpo, Oliveira and Comba 2005. Warped neighbouring views with gaps filled
+from others: Chen and Williams 1993.)
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from vcc.plan.depth_rule import ViewsBetween
 Array = NDArray[np.float32]
 
 BAND = 64
-"""Rows of a picture that a thread makes at once."""
+"""Rows of an image that a thread computes at a time."""
 TEAR = 0.25
-"""Pixels per view of disparity from pixel to pixel from which on a map shows a border, not a slanted surface."""
+"""Disparity step between neighbouring pixels, in pixels per view, above which a map has a border, not a slope."""
 
 
 class _Held:
-    """The last few of what takes time to make, within some bytes."""
+    """A cache of the views used last, with a memory limit."""
 
     def __init__(self, make: Callable[[int, int], View], limit: float) -> None:
         self._make, self._limit = make, limit
@@ -58,40 +58,40 @@ class _Held:
 
 
 class DenserViews:
-    """A light field with views in between, read like one on disk.
+    """A light field with views in between, read like a stored one.
 
     Args:
-        source: the light field that there is: in memory, or on disk.
-        between: how views in between are made.
-        threads: how many make a view at once.
-        held: bytes that views and maps, kept to be used again, may take.
+        source: the given light field, in memory or on disk.
+        between: how views in between are computed.
+        threads: number of threads that compute a view.
+        held: memory limit in bytes for cached views and maps.
     """
 
     def __init__(self, source: Samples, between: ViewsBetween, threads: int, held: float) -> None:
         self._source, self._given, self._between = source, source.grid.shape, between
         self._threads = threads
         self.unseen = 0
-        """Samples made so far that no view shows."""
+        """Number of samples made so far that no view shows."""
         self.made = 0
-        """Samples made so far, channels not counted."""
+        """Number of samples made so far, without channels."""
         self._views = _Held(self._read, held)
         self._own = {view: number for number, view in enumerate(between.maps.views)}
 
     @property
     def grid(self) -> Grid:
-        """The shape and type of the denser light field; where it lies, plans know."""
+        """Shape and type of the denser light field, without its frame, which is part of the plan."""
         return Grid(self._between.shape(self._given), Affine.identity(), np.dtype(np.float32))
 
     def whole(self) -> None:
-        """Made when they are read."""
+        """Do nothing: views are made when they are read."""
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes on disk of the light field that there is."""
+        """Bytes on disk of the given light field."""
         return self._source.stored_bytes
 
     def check_complete(self) -> None:
-        """Refuse a light field of which views are missing."""
+        """Raise an error if views of the given light field are missing."""
         self._source.check_complete()
 
     def read(self, block: Block) -> Array:
@@ -139,7 +139,7 @@ class DenserViews:
         return _seen_as(view.reshape(*view.shape[:2], -1), nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
-        """sign · disparity of a view: its own map's, or what the nearest map shows from there."""
+        """sign · disparity of a view: from its own map, or rendered from the nearest map."""
         sign, maps = np.float32(self._between.parallax.sign), self._between.maps
         if (row, column) in self._own:
             return np.ascontiguousarray(sign * maps.values[self._own[row, column]])
@@ -153,9 +153,9 @@ class DenserViews:
     def _looked_from(
         self, view: View, away: tuple[float, float], others: Any, first: int, stop: int
     ) -> tuple[Array, int]:
-        """The picture (rows, s, channels) from a place (down, across) views away, and how many pixels are unseen.
+        """The image (rows, s, channels) from a place (down, across) views away, and the number of unseen pixels.
 
-        ``others``: more views, as far away as they are, and weights, for what the first one does not show.
+        ``others``: further views, with their distances and weights, for places that the first one does not show.
         """
         out = np.zeros((stop - first, *view.samples.shape[1:]), dtype=np.float32)
         found = Found(first, out, *np.empty((3, *out.shape[:2]), dtype=np.float32))
@@ -181,7 +181,7 @@ class DenserViews:
         bounds = kernels.march_bounds(view.ranges, way)
         ends = np.linspace(parallax.sign * float(nearness.min()), parallax.sign * float(nearness.max()), 17)
         steps = np.abs(np.diff(parallax.down(ends))).max() / max(np.abs(np.diff(ends)).max(), 1e-30)
-        reach = float(max(abs(across), abs(down) * float(steps)))  # one type: kernels are compiled for each
+        reach = float(max(abs(across), abs(down) * float(steps)))  # a float: kernels are compiled per type
         march = March(way, reach, TEAR)
 
         def band(start: int) -> None:
@@ -192,15 +192,15 @@ class DenserViews:
 
 
 def _seen_as(samples: NDArray[Any], nearness: Array) -> View:
-    """A view (t, s, channels) of which the nearness (t, s) is known."""
+    """A `View` from samples (t, s, channels) and nearness (t, s)."""
     return View(samples, nearness, kernels.tile_ranges(nearness))
 
 
-# --- what the compiled march through disparity maps is given, under names, for `depth_kernels` ---
+# --- arguments of the compiled march through disparity maps, for `depth_kernels` ---
 
 
 class View(NamedTuple):
-    """A view and what is known of the depth in it.
+    """A view and its depth.
 
     Args:
         samples: (t, s, channels).
@@ -215,13 +215,13 @@ class View(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How things move in a view's picture, seen from a place between views: by their disparities.
+    """How points move on a view's pixels, seen from a place between views, by their disparities.
 
     Args:
-        columns: that the view lies before the place, in views.
-        rows: likewise.
+        columns: columns of views from the view to the place.
+        rows: rows of views, likewise.
         sign: of disparities: sign · disparity is nearness.
-        along_v: four numbers by which disparities along u are those along v, see
+        along_v: four numbers that convert disparities along u to those along v, see
             `vcc.plan.depth_rule.Parallax`.
     """
 
@@ -232,12 +232,12 @@ class Way(NamedTuple):
 
 
 class March(NamedTuple):
-    """How a view is marched through.
+    """Parameters of a march through a view.
 
     Args:
         way: see `Way`.
-        reach: pixels of the view, at most, that a march goes for each pixel per view of disparity.
-        tear: steps of nearness from pixel to pixel that are borders.
+        reach: largest length of a march, in pixels of the view for each pixel per view of disparity.
+        tear: step of nearness between neighbouring pixels above which there is a border.
     """
 
     way: Way
@@ -246,14 +246,14 @@ class March(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Rows of a picture from between views, and what has been found of it.
+    """Rows of an image between views, and their state.
 
     Args:
-        first: the picture's row that is the first one here.
-        out: (rows, s, channels), is added to.
-        seen: (rows, s), 1 where the nearest view shows what is there; else −1, less the weights of what other
-            views show.
-        far: (rows, s), the nearness met, or at tears that of the far side.
+        first: row of the image that is the first one here.
+        out: (rows, s, channels), added to.
+        seen: (rows, s), 1 if the nearest view shows the place; else −1, minus the weights of other views that
+            show it.
+        far: (rows, s), nearness of the surface; at tears that of the far side.
         near: (rows, s), likewise of the near side.
     """
 

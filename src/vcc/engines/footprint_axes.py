@@ -1,4 +1,4 @@
-"""How samples fall on pixels along one axis, as a table by sample, for what goes from pixels back to samples."""
+"""How samples fall on pixels along one axis: a table per sample, for the backward pass."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Axis(Brief):
 
     Args:
         origin: pixel coordinate of sample 0 of each tap, (taps,).
-        step: pixels from a sample to the next, before division.
-        index: of the samples, (samples,): fractions where they are divided.
-        refine: finer samples for each one.
-        pixels: how many there are.
+        step: pixels from a sample to the next, before subdivision.
+        index: index of each sample, (samples,): fractions if samples are subdivided.
+        refine: finer samples per sample.
+        pixels: number of pixels.
         opening: see `Footprints`.
         interpolation: see `Footprints`.
     """
@@ -44,8 +44,8 @@ class Axis(Brief):
         """First pixel and count (taps, samples), and shares (taps, samples, kinds, width) of each kind.
 
         Args:
-            kinds: ``"share"`` is F; the others say how it grows with a number.
-            multiple: of which the width is one; shares beyond the count are zero.
+            kinds: ``"share"`` is F; the others are its derivatives to a parameter.
+            multiple: the width is a multiple of this; shares beyond the count are zero.
         """
         step = self.step / self.refine
         position = self.origin[:, None] + self.step * self.index
@@ -63,7 +63,7 @@ class Axis(Brief):
         return first, count, made
 
     def shares(self, kinds: Sequence[str], pixel: Array, position: Array) -> list[Array]:
-        """F of samples at positions in pixels, or how it grows with a number, by kind."""
+        """F of samples at positions in pixels, or its derivative to a parameter, by kind."""
         given = self.interpolation, pixel, position, self.step / self.refine, self.opening
         share, index = shares(*given), self.index[:, None]
         place = size = opening = np.zeros(())
@@ -81,7 +81,7 @@ class Axis(Brief):
 
 
 def axes(core: Footprints, fine: FineGrid) -> tuple[Axis, Axis]:
-    """Rows of samples and columns of samples, where these part."""
+    """The axes of rows and of columns of samples, if they are separable."""
     index = [
         first + np.arange(n) / core.refine
         for first, n in ((fine.first_row, fine.rows), (fine.first_column, fine.columns))

@@ -1,8 +1,7 @@
-"""Compiled loops from the weights of a raster back to samples: all gather, so that nobody waits for anybody.
+"""Compiled loops from the weights of a raster back to samples. All of them gather, so threads never wait.
 
-The way of `vcc.engines.numba_kernels` in the other direction: the raster is mixed across once for each column of
-view taps, into the columns of its samples; then each row of samples is a sum of a few rows of that, made where it
-belongs.
+The transpose of `vcc.engines.numba_kernels`: the raster is mixed across once for each column of view taps, into
+the columns of its samples. Each row of samples is then a sum of a few of these rows, computed in place.
 """
 
 from __future__ import annotations
@@ -21,15 +20,15 @@ _compiled = compiled(fastmath=_FAST)
 _inlined = compiled(fastmath=_FAST, inline="always")
 
 
-# --- where rows and columns part ---
+# --- separable rows and columns ---
 
 
 @_compiled
 def mix_back(tiles, spread, a, channels, band, mixed):  # type: ignore[no-untyped-def]
     """mixed[8i + y, k · channels + c] = Σ share · tiles[i, x · channels + c, y] over the x that sample k falls on.
 
-    tiles: the raster, eight rows side by side, with zeros beyond its last column. spread: `Spread` of the columns
-    of samples in each column of view taps. a: which of these. band: of the tiles.
+    tiles: the raster, transposed in tiles of eight rows, with zeros beyond its last column. spread: `Spread` of
+    the columns of samples in each column of view taps. a: the column of view taps. band: of the tiles.
     """
     first, shares = spread.first[a], spread.shares[a]
     step, n = EIGHT * channels, mixed.shape[1]
@@ -48,14 +47,14 @@ def mix_back(tiles, spread, a, channels, band, mixed):  # type: ignore[no-untype
 
 @_compiled
 def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gradient):  # type: ignore[no-untyped-def]
-    """Add what a column of view taps reads, to rows of samples of some views, so many rows of each at a time.
+    """Add the gradients of a column of view taps to rows of samples of some views, ``height`` rows at a time.
 
-    mixed: the raster in the columns of the samples, as `mix_back` makes it. readers: `Readers`. spread: `Spread`
-    of the rows of samples in each row of taps. masks: `MaskLines`, a value for each column of samples; of no mask,
-    or of some. rows: `Band`. gradient: float32, flat.
+    mixed: the raster in the columns of the samples, from `mix_back`. readers: `Readers`. spread: `Spread` of the
+    rows of samples in each row of taps. masks: `MaskLines` of any number of masks, a value for each column of
+    samples. rows: `Band`. gradient: float32, flat.
 
-    Where samples are divided, mixed, spread and masks are of the finer ones. fine: `FineSamples`, without columns
-    where they are not. across: `Spread` of the columns of samples over those of finer ones.
+    If samples are subdivided, mixed, spread and masks refer to the finer samples. fine: `FineSamples`, without
+    columns if they are not. across: `Spread` of the columns of samples over those of the finer samples.
     """
     taps, ends, begin, weights, columns, channels = readers
     first_row, row_shares, divided = fine.first_row, fine.row_shares, fine.first_column.size > 0
@@ -94,7 +93,7 @@ def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gra
 
 @_inlined
 def _not_zero(shares):  # type: ignore[no-untyped-def]
-    """(first, after the last) of the shares that are not zero; twice the same for none."""
+    """(first, after the last) of the nonzero shares; equal if there are none."""
     low, stop = 0, shares.size
     while stop > 0 and shares[stop - 1] == 0:
         stop -= 1
@@ -105,7 +104,7 @@ def _not_zero(shares):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _add_rows(mixed, first, low, stop, shares, weight, anew, to):  # type: ignore[no-untyped-def]
-    """to += Σ weight · shares[m] · mixed[first + m], three at a time; to zero if ``anew``."""
+    """to += Σ weight · shares[m] · mixed[first + m], three at a time; set to zero first if ``anew``."""
     n = to.size
     if anew:
         to[:] = 0
@@ -127,7 +126,7 @@ def _add_rows(mixed, first, low, stop, shares, weight, anew, to):  # type: ignor
 
 @_inlined
 def _mask_row(weighed, row):  # type: ignore[no-untyped-def]
-    """The product of the masks' weights at a row of samples, from the lines that `masks_at` found."""
+    """The product of the masks' weights at a row of samples, from the lines of `masks_at`."""
     lines, places, shares = weighed
     flat, n = lines.reshape(-1), row.size
     for mask in range(places.shape[1]):
@@ -160,12 +159,12 @@ def _add_weighed(seen, row, channels, to):  # type: ignore[no-untyped-def]
                 to[k * channels + c] += row[k] * seen[k * channels + c]
 
 
-# --- divided samples ---
+# --- subdivided samples ---
 
 
 @_inlined
 def _give_rows(line, first, shares, start, sums):  # type: ignore[no-untyped-def]
-    """Give a row of finer samples to those rows of samples from ``start`` on that it is part of."""
+    """Add a row of finer samples to the rows of samples, from ``start`` on, that it is made from."""
     for t in range(shares.size):
         l = first + t - start
         if 0 <= l < len(sums) and shares[t] != 0:
@@ -176,9 +175,10 @@ def _give_rows(line, first, shares, start, sums):  # type: ignore[no-untyped-def
 
 @_inlined
 def _give_columns(sums, across, channels, begin, gradient):  # type: ignore[no-untyped-def]
-    """gradient[begin + …] += rows of finer samples, each column of samples the finer ones that are made of it.
+    """gradient[begin + …] += rows of finer samples, each summed into the columns of samples that it is made from.
 
-    across: `Spread` of the columns of samples over those of finer ones; sums have zeros beyond the last of these.
+    across: `Spread` of the columns of samples over those of finer samples; sums are zero beyond the last of
+    these.
     """
     first, shares = across
     for line in range(len(sums)):
@@ -204,15 +204,15 @@ def _give_columns(sums, across, channels, begin, gradient):  # type: ignore[no-u
                     gradient[start + k * channels + c] += total
 
 
-# --- where rows and columns do not part ---
+# --- sheared rows and columns ---
 
 
 @_compiled
 def mix_sheared_back(raster, view, grid, footprint, columns, band, mixed):  # type: ignore[no-untyped-def]
     """mixed[y, k, c] = Σ share · raster[y, x, c] over the x that column k of a view's samples falls on in row y.
 
-    raster: (rows, columns, channels). view: `View`, of which samples are not looked at. grid: `Grid`. footprint:
-    `Footprint`. columns: of samples, divided if need be.
+    raster: (rows, columns, channels). view: `View`, whose samples are not used. grid: `Grid`. footprint:
+    `Footprint`. columns: number of columns of samples, after subdivision.
     """
     width = abs(grid.column_step / grid.refine)
     reach = farthest(footprint, width)
@@ -231,10 +231,10 @@ def mix_sheared_back(raster, view, grid, footprint, columns, band, mixed):  # ty
 
 @_compiled
 def add_sheared_back(mixed, view, grid, footprint, masks, fine, across, rows, gradient):  # type: ignore[no-untyped-def]
-    """Add what a view tap reads, to some rows of samples, where rows and columns of samples shear.
+    """Add the gradients of a view tap to some rows of samples, if rows and columns of samples are sheared.
 
-    mixed: as `mix_sheared_back` makes it. view, grid, footprint: see there. masks: `Textures`. fine, across, rows:
-    see `add_rows_back`. gradient: of the view, flat.
+    mixed: from `mix_sheared_back`. view, grid, footprint: see there. masks: `Textures`. fine, across, rows: see
+    `add_rows_back`. gradient: of the view, flat.
     """
     _, columns, channels = mixed.shape
     first_row, row_shares, divided = fine.first_row, fine.row_shares, fine.first_column.size > 0
@@ -257,7 +257,7 @@ def add_sheared_back(mixed, view, grid, footprint, masks, fine, across, rows, gr
 
 @_inlined
 def _sheared_row(mixed, view, grid, footprint, masks, m, line):  # type: ignore[no-untyped-def]
-    """line[k, c] = what sample k of row m of a view tap gets; for the arguments see `add_sheared_back`."""
+    """line[k, c] = gradient of sample k of row m of a view tap; arguments as for `add_sheared_back`."""
     _, weight, _, y0, place = view
     textures, size, mask_step = masks
     row_step = grid.row_step / grid.refine

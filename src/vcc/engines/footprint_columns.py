@@ -1,4 +1,4 @@
-"""Footprints in which rows and columns part, by columns of view taps: the tables, and the loop over bands."""
+"""Footprints with separable rows and columns, by columns of view taps: tables, and the loop over bands."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
 from vcc.plan.footprints.model import Footprints
 
 BAND = 64
-"""Rows of the picture that a thread works on at once, at most."""
+"""Largest number of image rows that a thread works on at once."""
 BAND_BYTES = 3 * 2**17
-"""Their sums stay in the second-level cache."""
+"""Largest size of their sums, which stay in the second-level cache."""
 
 
 def bands(rows: int, height: int = BAND) -> list[tables.Band]:
-    """The picture's rows in bands so high."""
+    """Divide the rows of the image into bands of this height."""
     return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
 
 
 def band_height(line: int) -> int:
-    """How many rows of the picture make a band whose lines of sums take so many bytes: a multiple of eight."""
+    """Rows of the image in a band, if one row of sums has ``line`` bytes: a multiple of eight."""
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
 
 
 class ByColumns:
-    """Tables for plans in which rows and columns part, and the loop over columns of views and bands."""
+    """Tables for plans with separable rows and columns, and the loop over columns of views and bands."""
 
     def __init__(self, core: Footprints, channels: int, pool: Workers) -> None:
         self.core, self.channels, self.pool = core, channels, pool
         self.fine = fine = FineGrid(core)
         down, across = taps_along(core, fine)
         row_step, column_step = core.row_step / core.refine, core.column_step / core.refine
-        # How many rows of samples four rows of the raster gather, and how many the next four need anew.
+        # Rows of samples that four rows of the raster sum, and rows that the next four need in addition.
         count, rows = down.first.shape
         ends = np.pad(down.first, [(0, 0), (0, -rows % ROWS)], mode="edge").reshape(count, -1, ROWS)
         reach = int(np.ptp(ends, axis=2).max(initial=0)) + down.weights.shape[2]
@@ -54,8 +54,8 @@ class ByColumns:
             tables.Rows(down.first, down.weights, reach, advance),
             tables.Columns(across.first, across.weights),
         )
-        # A mask's weight counts for all channels of a sample: for three of them as it is looked up, for other
-        # numbers by being repeated.
+        # A mask's weight applies to all channels of a sample: three channels share a looked-up value; for any
+        # other number of channels the value is repeated.
         shared, repeated = (3, 1) if channels == 3 else (1, channels)
         self.masks = MaskColumns(core, fine, repeated, shared, pool)
 
@@ -64,7 +64,7 @@ class ByColumns:
         core, fine, done = self.core, self.fine, 0
         rows, columns = core.raster_shape
         tiles = np.zeros((-(-rows // EIGHT), columns * self.channels, EIGHT), dtype=np.float32)
-        # Values in a row of samples: as many as kernels add at once, at least.
+        # Values in a row of samples: at least as many as kernels add at once.
         pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
         divided = fine.tables(pitch) if core.refine > 1 else None
         weights = self.footprints.weights
@@ -80,12 +80,12 @@ class ByColumns:
         return self.untiled(tiles)
 
     def untiled(self, tiles: NDArray[np.float32]) -> NDArray[np.float32]:
-        """The raster (rows, columns × channels) of its tiles (rows / 8, columns · channels, 8)."""
+        """The raster (rows, columns × channels) from its tiles (rows / 8, columns · channels, 8)."""
         rows, columns = self.core.raster_shape
         raster = np.empty((rows, columns * self.channels), dtype=np.float32)
 
         def write(band: tables.Band) -> None:
-            # A real image runs against its samples: the raster is then in mirror writing.
+            # The columns of a real image run against those of its samples: its raster is computed mirrored.
             kernels.raster_of(tiles, self.channels, self.mirrored, band, raster)
 
         list(self.pool.map(write, bands(rows)))

@@ -1,9 +1,9 @@
-"""Compiled loops from the weights of a raster back to the numbers of footprints: places, steps, weights, masks.
+"""Compiled loops from the weights of a raster to gradients of footprints: places, steps, weights, masks.
 
-A column of view taps and a span of columns of samples at a time. The raster's weights are first mixed into the
-columns of the samples; then each row of samples is read once, while the few rows of weights that it falls on and
-the mask's lines that it meets lie in the first-level cache. What is summed along a row is so in single precision,
-everything else in double, always in the same order.
+They process a column of view taps and a span of columns of samples at a time. The raster's weights are first
+mixed into the columns of the samples. Then each row of samples is read once, while the few rows of weights on
+which it falls and the lines of masks around it are in the first-level cache. Sums along a row are in single
+precision, all others in double, always in the same order.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from vcc.engines.vector_rows import (
 from vcc.engines.vector_sums import EIGHT, fetch, mix_eight
 
 DIVIDED = 32
-"""Rows of finer samples that are made at once."""
+"""Rows of finer samples that are made at a time."""
 AHEAD = 2
-"""Rows of samples from what is read to what is asked for beforehand."""
+"""Rows of samples between the row being read and the row being prefetched."""
 
 _FAST = {"contract", "reassoc", "nsz"}
 _compiled = compiled(fastmath=_FAST)
@@ -40,7 +40,7 @@ _inlined = compiled(fastmath=_FAST, inline="always")
 
 @_compiled
 def turned(raster, tile, tiles):  # type: ignore[no-untyped-def]
-    """tiles[tile, x, y] = raster[8 · tile + y, x]: eight rows side by side, zero beyond the last."""
+    """tiles[tile, x, y] = raster[8 · tile + y, x]: eight rows transposed, zero beyond the last."""
     start = EIGHT * tile
     for y in range(min(EIGHT, raster.shape[0] - start)):
         for x in range(raster.shape[1]):
@@ -52,9 +52,9 @@ def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
     """mixed[s, y, (k − start) · channels + c] = Σ share · raster[y, x · channels + c] over x that sample k
     reaches.
 
-    tiles: the raster as `turned` has it. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows, values), rows a
-    multiple of eight, and more. It is zero in columns of samples that another span has or that are not there, and
-    in the rows beyond.
+    tiles: the raster, from `turned`. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows, values); a
+    multiple of eight rows, and more. It is zero in columns of samples that an earlier span has or that do not
+    exist, and in the further rows.
     """
     first, shares = gathered
     step = np.int64(EIGHT * channels)
@@ -77,25 +77,25 @@ def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
 
 @_compiled
 def add_gradients(samples, a, used, fine, tables, masks, sought, channels, span, totals):  # type: ignore[no-untyped-def]
-    """Add what the samples of a column of view taps say, those of a span of their columns.
+    """Add the gradients from the samples in a span of columns, for a column of view taps.
 
     Args:
         samples: `Samples`.
         a: the column of view taps.
-        used: the taps in it that are looked at.
+        used: the taps in it to process.
         fine: `FineSamples`, or None.
-        tables: the raster as `mix` has it, `Reached`, `Pairs`, and the weight of each tap in what lines of masks
-            say.
-        masks: `MaskLines`, a value for each column of samples; of no mask, or of some.
+        tables: the raster from `mix`, `Reached`, `Pairs`, and the weight of each tap in gradients of lines of
+        masks.
+        masks: `MaskLines` of any number of masks, a value for each column of samples.
         sought: `Sought`.
-        channels: values a sample.
+        channels: values per sample.
         span: `Span`.
         totals: (taps, sums) the sums over the samples of each tap.
     """
     mixed, reached, pairs, weights = tables
     values = (span.stop - span.start) * channels
     divided = np.zeros((DIVIDED if fine is not None else 0, values), np.float32)
-    # All taps that fall on some rows of the raster, before the next rows: their weights stay in the cache.
+    # All taps that fall on some rows of the raster come before the next rows: the weights stay in the cache.
     for part in range(reached.parts.shape[0]):
         for b in used:
             first, last = reached.parts[part, b, 0], reached.parts[part, b, 1]
@@ -116,12 +116,12 @@ def add_gradients(samples, a, used, fine, tables, masks, sought, channels, span,
 def add_rows(  # type: ignore[no-untyped-def]
     values, start, pitch, b, low, high, mixed, reached, pairs, weight, masks, sought, channels, span, totals
 ):
-    """As `add_numbers`, for rows ``low`` to before ``high`` of tap b; row 0 would begin at ``start``."""
+    """As `add_gradients`, for rows low ≤ l < high of tap b; ``start`` is the position of row 0."""
     n = span.stop - span.start
     wide = n * channels
     looks, sums = sought.texture.any() or sought.place.any(), pairs.row.size
-    # Arrays of one dimension and places in them, and no tuples: parts would have their references counted in every
-    # row, by all threads at once.
+    # Flat arrays and offsets instead of tuples: references to parts of tuples would be counted in every row, by
+    # all threads at once.
     firsts, shares, plain, index = reached.first, reached.shares, reached.plain.reshape(-1), reached.indices
     row_kind, column_kind, total_of = pairs.row, pairs.column, pairs.total
     counts, index_k = reached.counts, span.indices
@@ -191,7 +191,7 @@ def _through(lines, line, share, mask, start, n, out):  # type: ignore[no-untype
 
 @_inlined
 def _places(line, mask, start):  # type: ignore[no-untyped-def]
-    """Where in three lines of a mask a span begins."""
+    """Where a span begins in three lines of a mask."""
     return (
         np.uint64(line[0, mask, 0] + start),
         np.uint64(line[0, mask, 1] + start),
@@ -201,7 +201,7 @@ def _places(line, mask, start):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _steep(place, share, mask):  # type: ignore[no-untyped-def]
-    """By how much what three lines of a mask count grows with the place in it."""
+    """Derivatives of the weights of three lines of a mask to the place in the mask."""
     zero = np.float32(0)
     first, second, third = slopes_around(place)
     return (
@@ -215,7 +215,7 @@ def _steep(place, share, mask):  # type: ignore[no-untyped-def]
 def _seen(planes, y, wide, plain, first, rows, values, at, channels, out):  # type: ignore[no-untyped-def]
     """out[k] = Σ values[at + x] · Σ plain[first + t] · planes[y + t · wide + x] over the channels x of sample k.
 
-    The rows are taken in fours. out: room for all channels.
+    Rows are processed in fours. out: with space for all channels.
     """
     for t in range(0, rows, 4):
         four = plain[first + t], plain[first + t + 1], plain[first + t + 2], plain[first + t + 3]
@@ -256,7 +256,7 @@ def _without(seen, through, mask, count, n, out):  # type: ignore[no-untyped-def
 
 @_inlined
 def _lit(through, count, n, out):  # type: ignore[no-untyped-def]
-    """out[k]: the weights of all masks; one where there is none."""
+    """out[k]: the product of the weights of all masks; unchanged if there are none."""
     for mask in range(count):
         at = np.uint64(mask * n)
         if mask == 0:
@@ -282,7 +282,7 @@ def _weighed(values, at, lit, channels, n, out):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _to_lines(seen, weight, line, share, mask, start, n, lines):  # type: ignore[no-untyped-def]
-    """What a row of samples says of the three lines that it meets."""
+    """Add the gradients of a row of samples to the three lines of a mask around it."""
     parts = (
         np.float32(weight * share[0, mask, 0]),
         np.float32(weight * share[0, mask, 1]),
@@ -296,7 +296,7 @@ def _to_lines(seen, weight, line, share, mask, start, n, lines):  # type: ignore
 def _to_places(  # type: ignore[no-untyped-def]
     seen, lines, slopes, line, share, steep, b, mask, first_k, n, indices, row, places
 ):
-    """What a row of samples says of where it meets a mask, added to the six sums of `Sought`."""
+    """Add the gradients of a row of samples to its place on a mask to the six sums of `Sought`."""
     first, second, third = _places(line, mask, first_k)
     at_first, at_second, at_third = share[0, mask, 0], share[0, mask, 1], share[0, mask, 2]
     to_first, to_second, to_third = steep
@@ -320,7 +320,7 @@ def _to_places(  # type: ignore[no-untyped-def]
 
 @_compiled
 def slopes_at_columns(texture, column, out):  # type: ignore[no-untyped-def]
-    """out[r, k]: by how much texture[r] grows at column[k], as `numba_kernels.sample_mask_columns` looks it up."""
+    """out[r, k]: slope of texture[r] at column[k], as interpolated by `numba_kernels.sample_mask_columns`."""
     points, counts = columns_around(column, texture.shape[1])
     left, here, right = points[0], points[1], points[2]
     for k in range(column.size):
@@ -348,15 +348,15 @@ def give_back_columns(lines, column, texture):  # type: ignore[no-untyped-def]
             to[right[k]] += after[k] * value
 
 
-# --- where rows and columns do not part ---
+# --- sheared rows and columns ---
 
 SHEARED = 10
-"""Sums of a tap: see `add_sheared`."""
+"""Number of sums per tap: see `add_sheared`."""
 
 
 @_compiled
 def _height(interpolation, a):  # type: ignore[no-untyped-def]
-    """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline, 4 a box."""
+    """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 spline, 4 box."""
     r = abs(a)
     if interpolation == 4:
         return 1.0 if -0.5 <= a < 0.5 else 0.0
@@ -371,7 +371,7 @@ def _height(interpolation, a):  # type: ignore[no-untyped-def]
 
 @_compiled
 def _slopes(footprint, offset, size):  # type: ignore[no-untyped-def]
-    """A share, and how it grows with a sample's place, the size and the opening (`shares.share_slopes`)."""
+    """A share, and its derivatives to the sample's place, the size and the opening (`shares.share_slopes`)."""
     interpolation, _, opening = footprint
     share = share_at(footprint, offset, size)
     if interpolation == 0:
@@ -389,11 +389,12 @@ def _slopes(footprint, offset, size):  # type: ignore[no-untyped-def]
 
 @_compiled
 def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradient):  # type: ignore[no-untyped-def]
-    """Add what one view says by a band's raster rows, where rows and columns of samples shear.
+    """Add the gradients of one view from a band of raster rows, if rows and columns of samples are sheared.
 
-    With f = ΠT·F_y·L and the weights G mixed by F_x or its slopes: sums of f·G by the share along x, by its slope
-    to x alone, times k, times the rows from the view's place, and by its slope to the size; of the share along x
-    by the slope of F_y to y alone, times k, times l, and by the slope to the size; and by the openings of both.
+    Let f = ΠT·F_y·L, and let the weights G be mixed by F_x or one of its derivatives. Sums of f·G: with the
+    share along x; with its derivative to x, alone, times k, times the rows from the view's place; with its
+    derivative to the size. Sums with the share along x: with the derivative of F_y to y, alone, times k, times
+    l; with the derivative to the size. One sum with the derivatives of both to the opening.
 
     Args:
         view: `View`.
@@ -402,9 +403,9 @@ def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradie
         masks: `Textures`.
         raster: weights (rows, columns, channels).
         band: `Band`.
-        sums: (SHEARED,) where they are added.
+        sums: (SHEARED,) sums to add to.
         places: (masks, 6), see `Sought`.
-        gradient: of the textures, like them.
+        gradient: of the textures, shaped like them.
     """
     samples, weight, x0, y0, place = view
     textures, size, mask_step = masks
@@ -484,7 +485,7 @@ def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradie
 
 @_compiled
 def _three(place):  # type: ignore[no-untyped-def]
-    """As `three_around`, with how much each counts more at the next place, in double precision."""
+    """As `three_around`, with the derivatives of the weights to the place, in double precision."""
     middle = int(np.floor(place + 0.5))
     off = place - middle
     shares = 0.5 * (0.5 - off) ** 2, 0.75 - off * off, 0.5 * (0.5 + off) ** 2
@@ -493,7 +494,7 @@ def _three(place):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _looked_up(textures, mask, rows, columns, row, column):  # type: ignore[no-untyped-def]
-    """A mask at a place, and how it grows along its columns and along its rows; zeros around it."""
+    """A mask's value at a place, and its slopes along columns and along rows; zero around the mask."""
     value, along, down = 0.0, 0.0, 0.0
     if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:
         r, by_row, row_slopes = _three(row)
@@ -510,7 +511,7 @@ def _looked_up(textures, mask, rows, columns, row, column):  # type: ignore[no-u
 
 @_inlined
 def _given_back(gradient, mask, rows, columns, row, column, light):  # type: ignore[no-untyped-def]
-    """Add light to the points that are looked up at a place."""
+    """Add light to the points of a texture around a place; the transpose of `_looked_up`."""
     if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:
         r, by_row, _ = _three(row)
         c, by_column, _ = _three(column)

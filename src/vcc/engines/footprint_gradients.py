@@ -1,16 +1,16 @@
-"""From the weights of a raster back to the numbers of footprints, by compiled loops: see `footprint_gradients`.
+"""Gradients of a weighted raster to the parameters of footprints, in compiled loops: see `footprint_gradients`.
 
 With I(y, x) = scale · Σ L · w · Π T · F_y · F_x and weights G of I, the weights are first mixed into the columns
-of the samples of one column of view taps, H(y, k) = Σ_x F_x · G, and by the slopes of F_x, if places along x are
-wanted. A row of samples then meets the few rows y that it falls on. Everything that is wanted follows from two
-things:
+of the samples of one column of view taps, H(y, k) = Σ_x F_x · G, and also with the derivatives of F_x if
+gradients of positions along x are requested. A row of samples falls on a few rows y only. Two quantities give
+all gradients:
 
-- for weights, places and steps: sums of L · ΠT · H along a row, one for each y, times F_y or its slopes;
-- for masks: Σ_c L · Σ_y F_y · H at each sample, which is given to the three lines of a mask that the row meets,
-  and from those to the texture once for a column of view taps.
+- for weights, positions and steps: sums of L · ΠT · H along a row, one for each y, times F_y or its derivatives;
+- for masks: Σ_c L · Σ_y F_y · H at each sample. This is added to the three lines of a mask around the row, and
+from
+  the lines to the texture once per column of view taps.
 
-Threads take spans of columns of samples, always the same ones, so that the result does not depend on how many
-there are.
+Threads take spans of columns of samples. The spans do not depend on the number of threads, nor does the result.
 """
 
 from __future__ import annotations
@@ -46,15 +46,15 @@ from vcc.plan.footprints.model import Footprints
 Array = NDArray[np.float64]
 
 SPAN = 128
-"""Columns of samples that a thread works on at once, about."""
+"""Approximate number of columns of samples that a thread works on at once."""
 
 PART = 64
-"""Rows of the raster that are looked at by all taps before the next."""
+"""Rows of the raster that all taps process before the next rows."""
 
 TEXTURE_BYTES = 2**26
-"""Of textures for pieces of the raster, where rows and columns do not part."""
+"""Memory limit for textures of pieces of the raster, if rows and columns are sheared."""
 PIECES = 8
-"""How many at most."""
+"""Largest number of such pieces."""
 
 SUMS: dict[str, tuple[tuple[str, str], ...]] = {
     "weights": (("share", "share"),),
@@ -66,7 +66,7 @@ SUMS: dict[str, tuple[tuple[str, str], ...]] = {
     "y/k": (("place", "along"),),
     "y/l": (("step", "share"),),
 }
-"""Sums over the samples: of which shares along (y, x), by the product rule where a number changes both."""
+"""Sums over the samples, by kinds of shares along (y, x); two pairs (product rule) if a parameter changes both."""
 NEEDED = {
     "scale": ("weights",),
     "weights": ("weights",),
@@ -75,7 +75,7 @@ NEEDED = {
     "step": ("x/k", "x/l", "y/k", "y/l"),
     "opening": ("opening",),
 }
-"""Which of them each number takes."""
+"""The sums that each parameter needs."""
 
 
 def footprint_gradients(
@@ -86,25 +86,25 @@ def footprint_gradients(
     threads: int,
     progress: Progress | None = None,
 ) -> dict[str, Array]:
-    """The derivative of ⟨raster, the raster of the samples⟩ to numbers of the core, by name, each of its shape.
+    """The derivative of ⟨raster, raster of the samples⟩ to parameters of the core, by name, each of its shape.
 
-    Places and steps are held to be independent of each other: the derivative to ``x`` is that of each tap alone,
-    to ``weights`` also that of taps which let no light through.
+    Positions and steps are independent parameters: the derivative to ``x`` is that of each tap alone.
+    ``weights`` have a derivative for taps with a weight of zero, too.
 
     Args:
-        core: what is computed.
+        core: the footprints.
         values: the samples, (v, u, t, s[, channels]).
         raster: weights of the raster's values, (rows, columns, channels).
-        wanted: names of the core's numbers (`vcc.plan.parameters.numbers`).
-        threads: how many work at once. The same bytes for any number.
+        wanted: names of the core's parameters (`vcc.plan.parameters.numbers`).
+        threads: number of threads; the bytes do not depend on it.
         progress: called with (done, total).
 
     Raises:
-        InputError: a number to which there is no derivative.
+        InputError: a parameter that has no derivative.
     """
     core.check_wanted(wanted)
     channels = values.shape[4] if values.ndim == 5 else 1
-    if "weights" in wanted:  # taps without light, too
+    if "weights" in wanted:  # includes taps with a weight of zero
         core, weights = replace(core, weights=np.ones_like(core.weights)), core.weights
     else:
         weights = core.weights
@@ -119,7 +119,7 @@ def footprint_gradients(
 
 
 def _of_masks(core: Footprints, wanted: Collection[str]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of which masks the texture is wanted, and of which any place or step."""
+    """The masks with a requested gradient of the texture, and those with one of any place or step."""
     found = [
         [any(f"masks[{n}].{part}" in wanted for part in parts) for n in range(len(core.masks))]
         for parts in (("texture",), ("column", "row", "step"))
@@ -128,7 +128,7 @@ def _of_masks(core: Footprints, wanted: Collection[str]) -> tuple[NDArray[np.boo
 
 
 def _parts(first: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
-    """(parts, taps, 2): which rows of samples begin in each part of the raster; first ascends or descends."""
+    """(parts, taps, 2): the rows of samples that begin in each part of the raster; first ascends or descends."""
     part = first // PART
     parts = np.zeros((-(-rows // PART), len(first), 2), dtype=np.int64)
     for n, tap in np.ndindex(parts.shape[:2]):
@@ -139,7 +139,7 @@ def _parts(first: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
 
 
 def _spans(index: Array) -> list[tables.Span]:
-    """Columns of samples of these indices in spans; the last begins within the one before it, to be as long."""
+    """Spans of equal length over the columns of samples with these indices; the last two may overlap."""
     columns = max(index.size, LANES)
     number = -(-columns // SPAN)
     length = min(-(-columns // (number * LANES)), columns // LANES) * LANES
@@ -151,7 +151,7 @@ def _spans(index: Array) -> list[tables.Span]:
 
 
 class _ByColumns:
-    """Plans in which rows and columns part: the tables, and the loop over columns of views and spans."""
+    """Plans with separable rows and columns: tables, and the loop over columns of views and spans."""
 
     def __init__(
         self,
@@ -166,7 +166,7 @@ class _ByColumns:
         self.fine = fine = FineGrid(core)
         self.sums = [each for each in SUMS if any(each in NEEDED.get(name, ()) for name in wanted)]
         pairs = [(*pair, number) for number, each in enumerate(self.sums) for pair in SUMS[each]]
-        # "share" comes first, which masks take.
+        # "share" comes first, as masks need it.
         down = list(dict.fromkeys(["share", *(y for y, _, _ in pairs)]))
         across = list(dict.fromkeys(["share", *(x for _, x, _ in pairs)]))
         ordered = sorted((across.index(x), down.index(y), number) for y, x, number in pairs)
@@ -187,12 +187,12 @@ class _ByColumns:
         ]
         self.lines, self.slopes = (np.zeros((0, 0), dtype=np.float32) for _ in range(2))
         self.spans = _spans(along_x.index)
-        # Which columns of samples the spans hold, one span after the other.
+        # The columns of samples in the spans, one span after the other.
         held = np.concatenate([np.arange(span.start, span.stop) for span in self.spans])
         self.held = np.minimum(held, fine.columns - 1)
 
     def turned(self, raster: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-        """The raster, eight rows side by side, with zeros beyond the last column."""
+        """The raster, transposed in tiles of eight rows, with zeros beyond the last column."""
         tiles = aligned_buffer(-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT)
         tiles[:] = 0
         list(self.pool.map(lambda tile: kernels.turned(raster, tile, tiles), range(len(tiles))))
@@ -228,7 +228,7 @@ class _ByColumns:
         sought: tables.Sought,
         span: tables.Span,
     ) -> tuple[Array, Array]:
-        """What a span of the columns of samples says: the sums, and those of the masks' places."""
+        """The sums over a span of the columns of samples, and the sums for the masks' places."""
         taps = len(self.core.view_rows)
         totals, places = np.zeros((taps, len(self.sums))), np.zeros((taps, len(self.core.masks), 6))
         some = slice(span.start, span.stop)
@@ -248,7 +248,7 @@ class _ByColumns:
         return totals, places
 
     def masks_at(self, a: int) -> tuple[tables.MaskLines, tables.Sought]:
-        """Where a column of view taps meets masks, and room for what is sought of them."""
+        """The masks' lines for a column of view taps, and buffers for the masks' gradients."""
         met = self.masks.at(a, self.held.size) or no_masks()
         if self.texture.any():
             if len(self.lines) < len(met.lines):
@@ -257,26 +257,26 @@ class _ByColumns:
         if self.place.any():
             if len(self.slopes) < len(met.lines):
                 self.slopes = aligned_buffer(*met.lines.shape)
-                self.slopes[:] = 0  # and so beyond the samples' last column
+                self.slopes[:] = 0  # zero beyond the samples' last column
             list(self.pool.map(self.look_up, self.masks.pieces))
         return met, tables.Sought(self.lines, self.slopes, self.texture, self.place, np.zeros((0, 0, 6)))
 
     def look_up(self, piece: MaskPiece) -> None:
-        """The slopes of some lines of a mask."""
+        """Sample the slopes of some lines of a mask."""
         some = self.masks.textures[piece.mask][piece.start : piece.stop]
         kernels.slopes_at_columns(some, piece.columns, self.slopes[piece.to : piece.to + len(some)])
 
     def give_back(self) -> None:
-        """Add what was said of the masks' lines to their textures."""
+        """Add the gradients of the masks' lines to those of their textures."""
         groups: dict[tuple[int, int], list[MaskPiece]] = {}
         for piece in self.masks.pieces:
             if self.texture[piece.mask]:
                 groups.setdefault((piece.mask, piece.to - piece.start), []).append(piece)
-        for group in groups.values():  # whose pieces are rows of their own
+        for group in groups.values():  # pieces of a group are different rows
             list(self.pool.map(self.give_back_piece, group))
 
     def give_back_piece(self, piece: MaskPiece) -> None:
-        """Add what was said of some lines to the texture."""
+        """Add the gradients of some lines to the texture's gradient."""
         texture = self.textures[piece.mask]
         assert texture is not None
         some = texture[piece.start : piece.stop]
@@ -285,12 +285,12 @@ class _ByColumns:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Sums(Brief):
-    """What all samples of each tap say, before its weight.
+    """Sums over all samples of each tap, without the tap's weight.
 
     Args:
         of: by the names of `SUMS`, each (rows of taps, columns of taps).
         places: (rows of taps, columns of taps, masks, 6), see `vcc.engines.footprint_tables.Sought`.
-        textures: of each mask, with all weights; None where it is not wanted.
+        textures: gradient of each mask's texture, including all weights; None if it is not requested.
     """
 
     of: Mapping[str, Array]
@@ -299,7 +299,7 @@ class _Sums(Brief):
 
 
 def _named(core: Footprints, weights: Array, wanted: Collection[str], sums: _Sums) -> dict[str, Array]:
-    """What the sums over each tap's samples make of the numbers."""
+    """The derivatives to parameters, by name, from the sums over each tap's samples."""
     of, light = sums.of, weights * core.scale
 
     def number(name: str) -> Any:
@@ -332,11 +332,11 @@ def _sheared(
     pool: Workers,
     progress: Progress | None,
 ) -> _Sums:
-    """The sums where rows and columns do not part, view tap by view tap."""
+    """The sums if rows and columns are sheared, one view tap at a time."""
     fine = FineGrid(core)
     grid, footprint = on_raster(core, fine)
     masks = textures(core)
-    # Each piece of the raster has textures of its own, as many as there is room for.
+    # Each piece of the raster has its own textures, as many as the memory limit allows.
     pieces = int(np.clip(TEXTURE_BYTES // (8 * max(masks.values.size, 1)), 1, PIECES))
     ends = np.linspace(0, len(raster), pieces + 1).astype(int)
     bands = [tables.Band(int(low), int(high)) for low, high in pairwise(ends)]
@@ -380,9 +380,10 @@ def _of_shears(
     height: Array,
     opening: Array,
 ) -> dict[str, Array]:
-    """The sums by what they belong to, of those of `kernels.add_sheared`.
+    """The sums by the names of `SUMS`, from the sums of `kernels.add_sheared`.
 
-    A sample lies at x + shear·(row − y) + column_step·k, with shear = x/l : y/l, column_step = x/k − shear · y/k.
+    A sample lies at x + shear·(row − y) + column_step·k, with shear = x/l : y/l, column_step = x/k − shear ·
+    y/k.
     """
     (_, xl), (yk, yl) = core.step
     column_step = x_k + np.sign(core.column_step) / core.refine * width

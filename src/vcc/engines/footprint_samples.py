@@ -1,4 +1,4 @@
-"""The samples of a view as compiled loops of footprints meet them: divided into finer ones, and through masks."""
+"""The samples of a view for compiled loops of footprints: subdivided into finer ones, and seen through masks."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import REACH, TIE, Division, Taps, taps
 
 MASK_LINES = 64
-"""Lines of a mask that a thread samples at once."""
+"""Lines of a mask that a thread samples at a time."""
 
 
 class FineGrid:
-    """The samples of a view after division: how many, the index of the first, and how they are made.
+    """The samples of a view after subdivision: their number, the index of the first, and how they are computed.
 
     Args:
-        core: what says how.
+        core: the footprints.
     """
 
     def __init__(self, core: Footprints) -> None:
@@ -41,7 +41,7 @@ class FineGrid:
             self.divided_as = down, across
 
     def tables(self, pitch: int) -> tables.FineSamples:
-        """How kernels divide samples, into rows of so many values."""
+        """The arguments by which kernels subdivide samples, into rows of ``pitch`` values."""
         assert self.divided_as is not None
         down, across = self.divided_as
         shares = down.shares.astype(np.float32), across.shares.astype(np.float32)
@@ -50,12 +50,12 @@ class FineGrid:
     @property
     @cached
     def matrices(self) -> tuple[NDArray[np.float64], ...]:
-        """The division of rows and of columns as matrices, made once for all views."""
+        """The subdivision of rows and of columns as matrices, made once for all views."""
         assert self.divided_as is not None
         return tuple(part.matrix(n) for part, n in zip(self.divided_as, self.samples, strict=True))
 
     def divided(self, view: NDArray[Any]) -> NDArray[np.float32]:
-        """A view (t, s, channels) with its samples divided, for plans in which rows and columns do not part."""
+        """A view (t, s, channels) with its samples subdivided, for plans without separable rows and columns."""
         if self.divided_as is None:
             return np.ascontiguousarray(view, dtype=np.float32)
         down, across = self.matrices
@@ -64,7 +64,7 @@ class FineGrid:
 
 
 def taps_along(core: Footprints, fine: FineGrid) -> tuple[Taps, Taps]:
-    """Which rows of samples each row of the raster gathers, and which columns each column, where these part."""
+    """The rows of samples that each row of the raster sums, and the same for columns, if they are separable."""
     rows, columns = core.raster_shape
     start_y = core.y[:, 0] + core.row_step * fine.first_row
     start_x = core.x[0] + core.column_step * fine.first_column
@@ -76,14 +76,14 @@ def taps_along(core: Footprints, fine: FineGrid) -> tuple[Taps, Taps]:
 
 
 class MaskPiece(NamedTuple):
-    """Some rows of a mask's texture, as a group of taps looks them up.
+    """Some rows of a mask's texture, sampled for a group of taps.
 
     Args:
-        mask: which.
+        mask: number of the mask.
         start: the first row.
-        stop: after the last.
-        columns: where in the rows, for each column of samples.
-        to: which of the lines the first row makes.
+        stop: after the last row.
+        columns: texture column of each column of samples.
+        to: line for the first row.
     """
 
     mask: int
@@ -94,14 +94,14 @@ class MaskPiece(NamedTuple):
 
 
 class MaskColumns:
-    """The masks of a plan in which rows and columns part, as each column of view taps meets them.
+    """The masks of a plan with separable rows and columns, sampled for each column of view taps.
 
     Args:
-        core: whose masks they are.
-        fine: how its samples are divided.
-        repeated: how many values of a line stand for one sample, all the same.
-        shared: for how many channels a value counts.
-        pool: whose threads look them up.
+        core: the footprints with the masks.
+        fine: the subdivision of its samples.
+        repeated: number of equal values in a line for one sample.
+        shared: number of channels to which a value applies.
+        pool: threads that sample the masks.
     """
 
     def __init__(self, core: Footprints, fine: FineGrid, repeated: int, shared: int, pool: Workers) -> None:
@@ -113,14 +113,14 @@ class MaskColumns:
         self.pieces: list[MaskPiece] = []
 
     def at(self, a: int, pitch: int) -> tables.MaskLines | None:
-        """The masks' lines that taps of column ``a`` look up, at the columns of their samples; see the kernels.
+        """The masks' lines for the taps of column ``a``, at the columns of their samples; see the kernels.
 
-        Most taps of a column look a mask up in the same columns, those of cut cells elsewhere: each group of taps
-        that agree gets the lines that it needs. They hold until the next column's are made.
+        Most taps of a column sample a mask at the same columns; taps of cut cells do not. Each group of taps
+        with equal columns gets the lines that it needs. The lines are valid until the next call.
 
         Args:
             a: column of view taps.
-            pitch: values in a line, at least.
+            pitch: least number of values in a line.
         """
         core, fine = self.core, self.fine
         if not core.masks:
@@ -137,10 +137,10 @@ class MaskColumns:
             places, group = np.unique(np.round(mask.column[used, a], 7), return_inverse=True)
             for one in range(len(places)):
                 taps = used[group == one]
-                # With the three lines around each row of samples, wherever rounding puts it.
+                # Include three lines around each row of samples, whichever way rounding goes.
                 low = max(math.floor(ends[0, taps].min() - 0.5 - TIE), 0)
                 high = min(math.floor(ends[1, taps].max() + 0.5 + TIE) + 2, len(mask.texture))
-                if low >= high:  # all of it lies beyond the mask's border, where it is dark
+                if low >= high:  # entirely beyond the mask's border, where it is dark
                     continue
                 begin[number, taps] = total - low
                 first = mask.column[taps[0], a]
@@ -153,7 +153,7 @@ class MaskColumns:
         line = pitch // self.shared
         if self.lines.shape[0] < total:
             self.lines = aligned_buffer(total, line)
-            self.lines[:] = 0  # and so beyond the samples' last column
+            self.lines[:] = 0  # zero beyond the samples' last column
 
         def sample(piece: MaskPiece) -> None:
             texture = self.textures[piece.mask][piece.start : piece.stop]
@@ -165,7 +165,7 @@ class MaskColumns:
 
 
 def no_masks() -> tables.MaskLines:
-    """The lines of no mask, for kernels that take some or none."""
+    """Lines of no mask, for kernels that accept any number of masks."""
     whole, places = np.zeros(0, dtype=np.int64), np.zeros((0, 1))
     lines = np.zeros((0, 1), dtype=np.float32)
     return tables.MaskLines(lines, places.astype(np.int64), whole, places, places[:, 0], 1)
@@ -174,9 +174,9 @@ def no_masks() -> tables.MaskLines:
 def blocks(
     core: Footprints, values: NDArray[Any], by_column: bool
 ) -> Iterator[tuple[tables.Samples, tuple[int, int]]]:
-    """The samples in pieces that kernels can read, without ever copying more than a column of views.
+    """Yield the samples in pieces that kernels can read; at most one column of views is copied at a time.
 
-    With each, (first, end) of the columns of view taps that read it.
+    Each piece comes with (first, end) of the columns of view taps that read it.
     """
     nv, nu, nt, ns = values.shape[:4]
     channels = values.shape[4] if values.ndim == 5 else 1
@@ -202,11 +202,11 @@ def blocks(
         yield tables.Samples(column.reshape(-1), begin, none, pitch, channels), (a, a + 1)
 
 
-# --- where rows and columns do not part ---
+# --- sheared rows and columns ---
 
 
 def on_raster(core: Footprints, fine: FineGrid) -> tuple[tables.Grid, tables.Footprint]:
-    """How samples lie on the raster, and what the footprint of each is there."""
+    """The positions of samples on the raster, and the footprint of each sample there."""
     first = fine.first_column, fine.first_row
     grid = tables.Grid(core.step, core.shear, core.row_step, core.column_step, core.refine, *first)
     name = core.interpolation
@@ -216,7 +216,7 @@ def on_raster(core: Footprints, fine: FineGrid) -> tuple[tables.Grid, tables.Foo
 def view_of(
     core: Footprints, b: int, a: int, samples: NDArray[np.float32], weights: NDArray[np.float64]
 ) -> tables.View:
-    """A view tap with its samples, divided if need be, and its weight among those of all taps."""
+    """A view tap with its samples, subdivided if required, and its own weight."""
     place = np.array([[mask.column[b, a], mask.row[b, a]] for mask in core.masks]).reshape(-1, 2)
     return tables.View(samples, weights[b, a] * core.scale, core.x[b, a], core.y[b, a], place)
 

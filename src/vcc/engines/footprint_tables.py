@@ -1,8 +1,8 @@
-"""What the compiled loops of footprints are given: numbers and arrays under names, as Numba takes them.
+"""Arguments of the compiled loops of footprints: named tuples of numbers and arrays, as Numba accepts them.
 
-`vcc.engines.numba_cpu` fills these from a plan, `vcc.engines.numba_kernels` reads them. All arrays are contiguous.
-Where rows and columns of samples part, each tap of views has rows and columns of its own; else each view is taken
-by itself.
+`vcc.engines.numba_cpu` fills them from a plan, `vcc.engines.numba_kernels` reads them. All arrays are
+contiguous. If rows and columns of samples are separable, each view tap has one table of rows and one of columns;
+else views are processed one at a time.
 """
 
 from __future__ import annotations
@@ -17,24 +17,24 @@ Pair = tuple[float, float]
 
 
 class Band(NamedTuple):
-    """Rows of the picture that a thread works on: from ``start`` to before ``stop``."""
+    """Rows of the image that a thread works on: ``start`` to ``stop`` (exclusive)."""
 
     start: int
     stop: int
 
 
-# --- where rows and columns part ---
+# --- separable rows and columns ---
 
 
 class Samples(NamedTuple):
-    """Samples that lie in memory row by row: row l of view tap (b, a) begins at begin[b] + further[a] + l · pitch.
+    """Samples stored row by row: row l of view tap (b, a) begins at begin[b] + further[a] + l · pitch.
 
     Args:
         values: flat.
         begin: (rows of taps,) int64.
         further: (columns of taps,) int64.
         pitch: values from one row of samples to the next.
-        channels: values a sample.
+        channels: values per sample.
     """
 
     values: NDArray[Any]
@@ -51,7 +51,7 @@ class Lines(NamedTuple):
         values: flat.
         begin: (rows of taps,) int64.
         pitch: values in a row.
-        jump: from here to the samples of the next column.
+        jump: offset from these samples to those of the next column of taps.
     """
 
     values: NDArray[Any]
@@ -61,13 +61,13 @@ class Lines(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Which rows of samples a row of the raster gathers: ``shares`` of those from ``first`` on.
+    """The rows of samples that each row of the raster sums: ``shares`` of the rows from ``first`` on.
 
     Args:
         first: (rows of taps, raster rows) int64.
         shares: (rows of taps, raster rows, width) float32.
-        reach: the most rows of samples that four raster rows gather.
-        advance: rows of samples that the next four raster rows need anew.
+        reach: largest number of rows of samples that four raster rows sum.
+        advance: number of further rows of samples that the next four raster rows need.
     """
 
     first: NDArray[np.int64]
@@ -77,7 +77,7 @@ class Rows(NamedTuple):
 
 
 class Columns(NamedTuple):
-    """Which columns of samples a column of the raster gathers, likewise.
+    """The columns of samples that each column of the raster sums; see `Rows`.
 
     Args:
         first: (columns of taps, raster columns) int64.
@@ -92,7 +92,7 @@ class Footprints(NamedTuple):
     """How the samples of all view taps fall on the raster.
 
     Args:
-        weights: (rows of taps, columns of taps) float32, 0 of taps that are not added.
+        weights: (rows of taps, columns of taps) float32, 0 for taps that are skipped.
         rows: see `Rows`.
         columns: see `Columns`.
     """
@@ -103,14 +103,14 @@ class Footprints(NamedTuple):
 
 
 class FineSamples(NamedTuple):
-    """How samples are divided into finer ones, view by view.
+    """How samples are subdivided into finer ones, view by view.
 
     Args:
-        first_row: (finer rows,) int64, the first row of samples that makes a finer one.
-        row_shares: (finer rows, width) float32, of the rows from there on.
+        first_row: (finer rows,) int64, the first row of samples that contributes to a finer row.
+        row_shares: (finer rows, width) float32, shares of the rows from there on.
         first_column: (finer columns,), likewise.
         column_shares: (finer columns, width), likewise.
-        pitch: values of a row of finer samples.
+        pitch: values in a row of finer samples.
     """
 
     first_row: NDArray[np.int64]
@@ -121,15 +121,15 @@ class FineSamples(NamedTuple):
 
 
 class MaskLines(NamedTuple):
-    """Masks as the samples of one column of view taps meet them.
+    """Masks, sampled for one column of view taps.
 
     Args:
-        lines: (lines, pixels or values of a row of samples) float32, masks' weights at the columns of the samples.
-        begin: (masks, taps) int64, the line of a mask's row 0, or where it would be.
-        rows: (masks,) int64, how many a mask has.
+        lines: (lines, pixels or values of a row of samples) float32, mask weights at the columns of the samples.
+        begin: (masks, taps) int64, the line of row 0 of a mask, even if this row is not stored.
+        rows: (masks,) int64, number of rows of each mask.
         row: (masks, taps), mask row of sample row 0.
         row_step: (masks,), mask rows from one row of samples to the next.
-        repeat: 3 where a weight counts for three channels, else 1.
+        repeat: 3 if a weight applies to three channels, else 1.
     """
 
     lines: NDArray[np.float32]
@@ -145,9 +145,9 @@ class Entries(NamedTuple):
 
     Args:
         order: int64, the entries e sorted by which of the four rows they reach, as in `vector_sums.RANGES`.
-        ends: (10,) int64, how many entries of ``order`` reach each of the ranges or one before it.
+        ends: (10,) int64, number of entries of ``order`` in each range or an earlier one.
         places: (entries,) int64, where each entry's row of samples begins.
-        shares: (entries, 4) float32, what each of the four rows takes of it.
+        shares: (entries, 4) float32, share of the entry in each of the four rows.
     """
 
     order: NDArray[np.int64]
@@ -157,12 +157,12 @@ class Entries(NamedTuple):
 
 
 class EntryMasks(NamedTuple):
-    """The masks' weights of entries, by three lines each.
+    """The masks' weights of entries, from three lines each.
 
     Args:
         lines: see `MaskLines`.
-        places: (entries, masks, 3) int64, where in them the line above, the nearest and the one below begin.
-        shares: (entries, masks, 3) float32, what each counts.
+        places: (entries, masks, 3) int64, where the line above, the nearest line and the line below begin.
+        shares: (entries, masks, 3) float32, weight of each line.
     """
 
     lines: NDArray[np.float32]
@@ -171,18 +171,19 @@ class EntryMasks(NamedTuple):
 
 
 class ManyLines(NamedTuple):
-    """The textures of one mask, several of a size, as the samples of one column of view taps meet them.
+    """Several textures of equal size for one mask, sampled for one column of view taps.
 
     Args:
-        lines: (textures, and some of zero to a multiple of four; lines; pixels or values of a row of samples)
+        lines: (textures, padded with zeros to a multiple of four; lines; pixels or values of a row of samples)
             float32.
-        taps: int64, rows of taps; those of a group look up lines side by side and end before ``ends[n + 1]``.
+        taps: int64, rows of taps in groups; taps of a group use neighbouring lines. Group n ends before
+            ``ends[n + 1]``.
         ends: (groups + 1,) int64.
-        begin: (rows of taps,) int64, the line of the mask's row 0, or where it would be.
-        rows: how many the mask has.
+        begin: (rows of taps,) int64, the line of row 0 of the mask, even if this row is not stored.
+        rows: number of rows of the mask.
         row: (rows of taps,), mask row of sample row 0.
         row_step: mask rows from one row of samples to the next.
-        repeat: 3 where a weight counts for three channels, else 1.
+        repeat: 3 if a weight applies to three channels, else 1.
     """
 
     lines: NDArray[np.float32]
@@ -195,15 +196,15 @@ class ManyLines(NamedTuple):
     repeat: int
 
 
-# --- and backwards ---
+# --- backward ---
 
 
 class Spread(NamedTuple):
-    """Which rows of the raster a row of samples falls on: ``shares`` of those from ``first`` on; columns likewise.
+    """The rows of the raster that a row of samples falls on: ``shares`` of the rows from ``first`` on; or columns.
 
     Args:
         first: (taps, samples) int64.
-        shares: (taps, samples, width) float32, some of them zero, those beyond the raster always.
+        shares: (taps, samples, width) float32; some are zero, always those beyond the raster.
     """
 
     first: NDArray[np.int64]
@@ -214,12 +215,12 @@ class Readers(NamedTuple):
     """The view taps of one column, sorted by the view that they read.
 
     Args:
-        taps: int64, rows of taps that are added; those that read the n-th view end before ``ends[n + 1]``.
+        taps: int64, rows of taps with a weight; those that read the n-th view end before ``ends[n + 1]``.
         ends: (views + 1,) int64.
         begin: (views,) int64, where the samples of a view begin.
         weights: (rows of taps,) float32.
-        columns: of samples in a view.
-        channels: values a sample.
+        columns: columns of samples in a view.
+        channels: values per sample.
     """
 
     taps: NDArray[np.int64]
@@ -230,16 +231,16 @@ class Readers(NamedTuple):
     channels: int
 
 
-# --- where they do not ---
+# --- sheared rows and columns ---
 
 
 class View(NamedTuple):
     """One view tap.
 
     Args:
-        samples: (t, s, channels) float32, divided if need be.
+        samples: (t, s, channels) float32, subdivided if required.
         weight: of the tap.
-        x: raster column of sample (0, 0) before division.
+        x: raster column of sample (0, 0) before subdivision.
         y: raster row.
         masks: (masks, 2), mask column and row of that sample.
     """
@@ -252,14 +253,14 @@ class View(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """How samples lie on the raster, sheared.
+    """How samples lie on a sheared raster.
 
     Args:
         step: 2×2, raster (column, row) from one sample to the next along (k, l).
         shear: raster columns from one raster row to the next.
         row_step: raster rows from one row of samples to the next.
         column_step: raster columns from one column to the next, along a row of the raster.
-        refine: finer samples for each one, each way.
+        refine: finer samples per sample along each axis.
         first_k: index of the first column of finer samples.
         first_l: of the first row.
     """
@@ -274,12 +275,12 @@ class Grid(NamedTuple):
 
 
 class Footprint(NamedTuple):
-    """What a sample's footprint is along an axis.
+    """The footprint of a sample along one axis.
 
     Args:
-        interpolation: 0 nearest, 1 linear, 2 cubic, 3 a spline, 4 a box.
-        reach: samples to each side.
-        opening: size of a pixel's sensitive part, in pixels.
+        interpolation: 0 nearest, 1 linear, 2 cubic, 3 spline, 4 box.
+        reach: half-width of the footprint, in samples.
+        opening: size of the sensitive part of a pixel, in pixels.
     """
 
     interpolation: int
@@ -288,11 +289,11 @@ class Footprint(NamedTuple):
 
 
 class Textures(NamedTuple):
-    """The masks themselves.
+    """The textures of masks.
 
     Args:
-        values: (masks, rows, columns) float32, of which each mask fills a part.
-        size: (masks, 2) int64, its rows and columns.
+        values: (masks, rows, columns) float32; each mask fills a part of its rows and columns.
+        size: (masks, 2) int64, rows and columns of each mask.
         step: (masks, 2, 2), mask (column, row) from one sample to the next along (k, l).
     """
 
@@ -301,18 +302,18 @@ class Textures(NamedTuple):
     step: Array
 
 
-# --- the finished picture ---
+# --- the finished image ---
 
 
 class Finish(NamedTuple):
-    """How rows of the raster become rows of the picture.
+    """How rows of the raster become rows of the image.
 
     Args:
         down: (odd,) float32, filter along columns.
-        across: (odd,) float32, along rows.
-        channels: values a pixel.
-        guard: raster pixels around the picture.
-        transmission: (rows, columns) of the picture, or empty.
+        across: (odd,) float32, filter along rows.
+        channels: values per pixel.
+        guard: raster pixels around the image.
+        transmission: (rows, columns) of the image, or empty.
     """
 
     down: NDArray[np.float32]
@@ -322,22 +323,21 @@ class Finish(NamedTuple):
     transmission: NDArray[Any]
 
 
-# --- backwards, to a plan's numbers ---
+# --- backward, to a plan's parameters ---
 
 
 class Reached(NamedTuple):
-    """Which rows of the raster a row of samples reaches, from ``first`` on, and how much by each kind of share.
+    """The rows of the raster that a row of samples reaches, from ``first`` on, with shares of each kind.
 
     Args:
         first: (rows of taps, rows of samples) int64.
-        counts: (rows of taps, rows of samples) int64, how many rows.
-        shares: (rows of taps, rows of samples, kinds, width), zero where there is none; the width a multiple of
+        counts: (rows of taps, rows of samples) int64, number of rows.
+        shares: (rows of taps, rows of samples, kinds, width), zero if there is none; the width is a multiple of
             four.
-        plain: float32, those of the first kind.
-        indices: (rows of samples,), of each: fractions where samples are divided.
-        parts: (parts, rows of taps, 2) int64, the rows of samples, from and to before, whose first row lies in
-            each
-            part of the raster.
+        plain: float32, the shares of the first kind.
+        indices: (rows of samples,), index of each row; fractions if samples are subdivided.
+        parts: (parts, rows of taps, 2) int64, the rows of samples (start, stop) whose first raster row lies in
+            each part of the raster.
     """
 
     first: NDArray[np.int64]
@@ -349,12 +349,12 @@ class Reached(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Which share of rows and which of columns make up each sum over the samples.
+    """The kind of row share and the kind of column share of each sum over the samples.
 
     Args:
         row: int64, the kind in `Reached`.
         column: int64, the kind in `Gathered`, ascending.
-        total: int64, to which sum each pair adds.
+        total: int64, index of the sum to which each pair adds.
     """
 
     row: NDArray[np.int64]
@@ -363,7 +363,7 @@ class Pairs(NamedTuple):
 
 
 class Gathered(NamedTuple):
-    """Which columns of the raster a column of samples gathers its weight from, by each kind of share.
+    """The columns of the raster from which a column of samples gathers its weight, by kind of share.
 
     Args:
         first: (columns of samples,) int64.
@@ -375,13 +375,13 @@ class Gathered(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Columns of samples that a thread works on: from ``start`` to before ``stop``, a multiple of ``LANES``.
+    """Columns of samples that a thread works on: ``start`` to ``stop`` (exclusive), a multiple of ``LANES``.
 
     Args:
-        start: the first.
-        stop: after the last.
-        fresh: the first that no span before it has.
-        to: where in lines of `Sought.lines` they begin.
+        start: the first column.
+        stop: after the last column.
+        fresh: the first column that is not in an earlier span.
+        to: where these columns begin in the lines of `Sought.lines`.
         indices: float32, of all columns of samples.
     """
 
@@ -393,15 +393,15 @@ class Span(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """What is wanted of masks, and where it goes.
+    """The requested gradients of masks, and the buffers for them.
 
     Args:
-        lines: like those of `MaskLines`, but by the columns of all spans: to which is added what they say.
-        slopes: like those of `MaskLines`, by how much they grow from a column of theirs to the next.
-        texture: (masks,) whether lines are wanted.
-        place: (masks,) whether places are.
-        places: (taps, masks, 6) sums that places follow from: of the slope along columns, times k, times l, and
-            the same of the slope along rows.
+        lines: like `MaskLines.lines`, but for the columns of all spans: gradients of the lines are added here.
+        slopes: like `MaskLines.lines`: the derivative of each weight along the mask's columns.
+        texture: (masks,) whether gradients of lines are requested.
+        place: (masks,) whether gradients of places are requested.
+        places: (taps, masks, 6) sums for the gradients of places: of the slope along columns, times k, times l,
+            and the same for the slope along rows.
     """
 
     lines: NDArray[np.float32]

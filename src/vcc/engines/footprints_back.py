@@ -1,11 +1,11 @@
-"""The fast engine's sum backwards: what the weights of a raster say of each sample, in compiled loops that gather.
+"""The transpose of the fast engine's sum by footprints: weights of a raster to samples, in compiled gather loops.
 
     L̄(q) = scale · w(view) · Π T(m(q)) · Σ_y F(y; y(q)) Σ_x F(x; x(q)) G(x, y)
 
-For each column of view taps the raster's weights G are mixed across once, into the columns of the samples. A row
-of samples is then a sum of the few rows of that on which it falls, made where it belongs and written once, band by
-band, so that what is mixed stays in the second-level cache. Every row is summed in the same order whoever does it:
-the bytes do not depend on how many threads there are.
+For each column of view taps, the raster's weights G are mixed across once, into the columns of the samples. A
+row of samples is then a sum of the few mixed rows on which it falls. It is computed in place and written once,
+band by band, so that the mixed rows stay in the second-level cache. Every sum has a fixed order: the bytes do
+not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import Taps
 
 BAND_BYTES = 2**19
-"""Of what is mixed for the rows of samples that are made at once: it stays in the second-level cache."""
+"""Size of the mixed rows for the rows of samples of one band: they stay in the second-level cache."""
 LEAST, MOST = 32, 256
-"""Rows of samples that are made at once: fewer are divided too often, more leave threads without work."""
+"""Limits of the rows of samples in a band: fewer are subdivided too often, more leave threads without work."""
 TASKS = 3
-"""Pieces of work for each thread, at least, where there is so much."""
+"""Least number of tasks per thread, if there is enough work."""
 
 Weights = NDArray[np.float32]
 
@@ -43,19 +43,19 @@ def samples_back(
     threads: int,
     progress: Progress | None = None,
 ) -> Weights:
-    """The derivative of ⟨raster, what footprints make of samples⟩ to the samples.
+    """The derivative of ⟨raster, raster of the samples⟩ to the samples.
 
     Args:
         core: the footprints.
         shape: of the samples, (v, u, t, s[, channels]).
         raster: weights of the raster's values, (rows, columns, channels).
-        threads: how many work at once.
+        threads: number of threads.
         progress: called with (done, total).
 
     Returns:
-        Float32 of this shape; zero of views that no tap reads.
+        Float32 of this shape; zero for views that no tap reads.
     """
-    # New memory is zero, and costs no more than memory that need not be.
+    # np.zeros costs no more than np.empty for new memory.
     gradient = np.zeros(shape, dtype=np.float32)
     weights = np.ascontiguousarray(raster, dtype=np.float32)
     with Workers(threads) as pool:
@@ -65,7 +65,7 @@ def samples_back(
 
 
 class _Back:
-    """What both ways have in common: the samples' gradient, their division, and bands of their rows."""
+    """Common parts of both cases: the samples' gradient, their subdivision, and bands of their rows."""
 
     def __init__(self, core: Footprints, gradient: Weights, raster: Weights, pool: Workers, threads: int) -> None:
         self.core, self.gradient, self.raster, self.pool, self.threads = core, gradient, raster, pool, threads
@@ -76,16 +76,16 @@ class _Back:
         self.divided, self.across = _division(fine, self.n)
 
         self.height = int(np.clip(BAND_BYTES // (4 * self.n), LEAST, MOST))
-        """Rows of samples that are made at once."""
+        """Rows of samples in a band."""
 
     def pieces(self, rows: int, parts: int = 1) -> list[tables.Band]:
-        """So many rows in bands: enough of them for all threads, where there are so many parts already."""
+        """Divide rows into bands: enough of them for all threads, given the number of parts."""
         bands = -(-TASKS * self.threads // parts)
         return _bands(rows, -(-rows // bands))
 
 
 class _ByColumns(_Back):
-    """Where rows and columns part: column by column of view taps."""
+    """Separable rows and columns: one column of view taps at a time."""
 
     def run(self, progress: Progress | None) -> None:
         """Fill the gradient."""
@@ -103,7 +103,7 @@ class _ByColumns(_Back):
         tell(progress, core.taps_used, core.taps_used)
 
     def column(self, a: int) -> None:
-        """Add what a column of view taps reads."""
+        """Add the gradients of a column of view taps."""
         mix = partial(kernels.mix_back, self.tiles, self.sideways, a, self.channels)
         list(self.pool.map(lambda band: mix(band, self.mixed), self.pieces(len(self.tiles))))
         masks = self.masks.at(a, self.fine.columns) or no_masks()
@@ -114,13 +114,13 @@ class _ByColumns(_Back):
             fine = self.divided, self.across
             kernels.add_rows_back(self.mixed, readers, self.down, masks, *fine, rows, self.height, flat)
 
-        # Whole views, if there are enough of them: two threads that meet in a fresh page of memory both clear it.
+        # Whole views if there are enough: two threads that write to one new page of memory both clear it.
         parts = self.readers(a)
         bands = self.pieces(self.core.samples[0], len(parts))
         list(self.pool.map(add, [(readers, band) for readers in parts for band in bands]))
 
     def readers(self, a: int) -> list[tables.Readers]:
-        """The taps of a column by the views that they read, in parts."""
+        """The taps of a column, sorted by the views that they read, in parts."""
         core = self.core
         used = np.flatnonzero(core.weights[:, a])
         views, which = np.unique(core.view_rows[used], return_inverse=True)
@@ -137,7 +137,7 @@ class _ByColumns(_Back):
 
 
 class _Sheared(_Back):
-    """Where rows and columns do not part: view tap by view tap."""
+    """Sheared rows and columns: one view tap at a time."""
 
     def run(self, progress: Progress | None) -> None:
         """Fill the gradient."""
@@ -160,18 +160,18 @@ class _Sheared(_Back):
 
 
 def _bands(rows: int, height: int) -> list[tables.Band]:
-    """So many rows in bands so high."""
+    """Divide rows into bands of ``height``."""
     return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
 
 
 def _spread(axis: Axis) -> tables.Spread:
-    """Where samples' light goes."""
+    """The pixels that each sample falls on, along an axis."""
     first, _, shares = axis.table()
     return tables.Spread(first, np.ascontiguousarray(shares[:, :, 0], dtype=np.float32))
 
 
 def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Spread]:
-    """How samples are divided, and of which finer columns each is made; nothing where they are not."""
+    """The subdivision of samples, and the finer columns of each sample; empty if samples are not subdivided."""
     if fine.divided_as is None:
         rows, nothing = np.arange(fine.rows), np.zeros((0, 1), dtype=np.float32)
         none = np.zeros(0, dtype=np.int64)
@@ -183,7 +183,7 @@ def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Sp
 
 
 def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:
-    """A raster (rows, columns, channels) as (rows / 8, values, 8), with columns of zeros beyond its last."""
+    """A raster (rows, columns, channels) as tiles (rows / 8, values, 8), with columns of zeros beyond its last."""
     rows, columns, channels = raster.shape
     tall = np.zeros((-(-rows // EIGHT) * EIGHT, (columns + beyond) * channels), dtype=np.float32)
     tall[:rows, : columns * channels] = raster.reshape(rows, -1)

@@ -1,8 +1,9 @@
-"""Several rasters of one light field at once, by cameras that differ in a mask alone: samples are read once.
+"""Several rasters of one light field in one pass over the samples, for cameras that differ in one mask only.
 
-Codes at the views differ in the weights of view taps: the rows of each view are summed once, and the sums of a
-column of views are mixed by all sets of weights. Masks in mid-path differ in their textures: what falls on a row
-of the raster through the same line of a texture is summed once, and all textures weigh it. See `many_kernels`.
+Coded apertures at the views differ in the weights of view taps: the rows of each view are summed once, and each
+set of weights mixes the sums of a column of views. Masks in mid-path differ in their textures: the samples that
+reach a row of the raster through the same line of a texture are summed once, and each texture weighs the sum.
+See `many_kernels`.
 """
 
 from __future__ import annotations
@@ -27,16 +28,17 @@ from vcc.engines.vector_weights import MASKS
 from vcc.plan.footprints.model import Footprints
 
 IN_CACHE = 32
-"""Rows of the picture for which all views of a column stay in the second-level cache, about."""
+"""Approximate number of image rows for which all views of a column stay in the second-level cache."""
 FEWEST = 2
-"""Rasters that are worth more than one after the other."""
+"""Least number of rasters for which one pass pays."""
 
 
 def differing_mask(cores: Sequence[Footprints]) -> int | None:
-    """What rasters that can be made at once differ in: −1 the weights of views, or n the texture of mask n.
+    """The difference between rasters that one pass can compute: −1 for weights of views, n for the texture of
+    mask n.
 
-    None where they cannot: they can where rows and columns part, where samples are not divided, and where nothing
-    else differs.
+    None if one pass cannot compute them: rows and columns are not separable, samples are subdivided, or the
+    cores differ in anything else.
     """
     first = cores[0]
     if len(cores) < FEWEST or not first.separable or first.refine > 1:
@@ -50,7 +52,7 @@ def differing_mask(cores: Sequence[Footprints]) -> int | None:
 
 
 def _with_texture_of(core: Footprints, other: Footprints, n: int) -> Footprints:
-    """A core whose mask n has the texture of another's, if that has its size."""
+    """A core with the texture of another core's mask n, if the sizes are equal; else the core itself."""
     if len(core.masks) != len(other.masks) or core.masks[n].texture.shape != other.masks[n].texture.shape:
         return core
     mask = replace(core.masks[n], texture=other.masks[n].texture)
@@ -60,12 +62,12 @@ def _with_texture_of(core: Footprints, other: Footprints, n: int) -> Footprints:
 def rasters(
     cores: Sequence[Footprints], values: NDArray[Any], threads: int, progress: Progress | None = None
 ) -> list[NDArray[np.float32]] | None:
-    """The raster (rows, columns, channels) of each core; None where they cannot be made at once.
+    """The raster (rows, columns, channels) of each core; None if one pass cannot compute them.
 
     Args:
-        cores: what is computed; see `differing_mask`.
+        cores: the footprints; see `differing_mask`.
         values: the samples, (v, u, t, s[, channels]).
-        threads: how many work at once. The same bytes for any number.
+        threads: number of threads; the bytes do not depend on it.
         progress: called with (done, total).
     """
     differing = differing_mask(cores)
@@ -80,16 +82,16 @@ def rasters(
 
 
 def rasters_by_turns(cores: Sequence[Footprints], values: NDArray[Any]) -> list[NDArray[np.float32]] | None:
-    """The raster (rows, columns, channels) of each core, by this thread, to the bit as by itself.
+    """The raster (rows, columns, channels) of each core, on this thread, with the same bytes as `run`.
 
-    All of them take a band of samples in turn, while it is in the cache.
+    All cores process a band of samples, interleaved, while the samples are in the cache.
 
     Args:
-        cores: what is computed.
+        cores: the footprints.
         values: the samples, (v, u, t, s[, channels]).
 
     Returns:
-        None where rows and columns do not part, samples are divided, or views are taken otherwise.
+        None if rows and columns are not separable, samples are subdivided, or the cores read different views.
     """
     first, channels = cores[0], values.shape[4] if values.ndim == 5 else 1
     for core in cores:
@@ -118,10 +120,10 @@ class _Many:
     """Several rasters: the loop over columns of views and bands.
 
     Args:
-        core: what all have in common; its weights are 0 of taps that none adds.
-        count: of rasters.
-        channels: values a sample.
-        pool: whose threads work.
+        core: the common part; its weights are 0 for taps that no raster uses.
+        count: number of rasters.
+        channels: values per sample.
+        pool: the threads.
     """
 
     def __init__(self, core: Footprints, count: int, channels: int, pool: Workers) -> None:
@@ -144,12 +146,12 @@ class _Many:
         return [self.columns.untiled(each).reshape(rows, columns, self.channels) for each in tiles]
 
     def adder(self, a: int, pitch: int) -> Any:
-        """What adds column ``a`` of view taps: a function of samples, column, band and tiles."""
+        """A function of samples, column, band and tiles that adds column ``a`` of view taps."""
         raise NotImplementedError
 
 
 class _OfWeights(_Many):
-    """Rasters that weigh views otherwise."""
+    """Rasters with different weights of views."""
 
     def __init__(self, cores: Sequence[Footprints], channels: int, pool: Workers) -> None:
         several = np.stack([core.weights * core.scale for core in cores]).astype(np.float32)
@@ -169,7 +171,7 @@ class _OfWeights(_Many):
 
 
 class _OfTextures(_Many):
-    """Rasters through other textures of one mask."""
+    """Rasters with different textures of one mask."""
 
     def __init__(self, cores: Sequence[Footprints], number: int, channels: int, pool: Workers) -> None:
         first = cores[0]
@@ -193,7 +195,7 @@ class _OfTextures(_Many):
         return add
 
     def lines_at(self, a: int, pitch: int) -> tables.ManyLines:
-        """All textures' lines that column ``a`` looks up."""
+        """Lines of all textures, sampled for column ``a``."""
         one = self.met.at(a, pitch)
         assert one is not None
         if self.lines.shape[1:] != one.lines.shape:

@@ -1,6 +1,7 @@
-"""Looking up a grid by quadratic B-splines (`vcc.base.lookup.three_around`), for compiled kernels.
+"""Interpolate a grid by quadratic B-splines (`vcc.base.lookup.three_around`), for compiled kernels.
 
-Inlined before compiling: an array that is handed on has its references counted, by all threads at once.
+The functions are inlined before compiling: references to array arguments would be counted, by all threads at
+once.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ _inlined = compiled(inline="always")
 
 @_inlined
 def three_around(place):  # type: ignore[no-untyped-def]
-    """The point nearest to a place, and what the one before it, it and the one after it count, float32."""
+    """The point nearest to a place, and the weights of the points before, at and after it, float32."""
     middle = np.int64(math.floor(place + 0.5))
     off = np.float32(place - middle)
     half = np.float32(0.5)
@@ -30,9 +31,9 @@ def three_around(place):  # type: ignore[no-untyped-def]
 
 @_inlined
 def slopes_around(place):  # type: ignore[no-untyped-def]
-    """By how much what three points around a place count grows with the place, float32.
+    """Derivatives to the place of the weights of the three points around it, float32.
 
-    A point that counts nothing does not grow: so points outside the grid are known by what they count.
+    Callers set derivatives to zero for points outside the grid, whose weight is zero.
     """
     off, half = np.float32(place - np.floor(place + 0.5)), np.float32(0.5)
     return off - half, np.float32(-2) * off, off + half
@@ -40,7 +41,7 @@ def slopes_around(place):  # type: ignore[no-untyped-def]
 
 @_inlined
 def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
-    """An array (rows, columns) at a place between its points, with zeros around it."""
+    """An array (rows, columns) interpolated at a place between its points, zero around the array."""
     rows, columns = values.shape
     total = np.float32(0)
     if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:
@@ -60,14 +61,14 @@ def dark_outside(values, row, column):  # type: ignore[no-untyped-def]
     return total
 
 
-# --- linearly between the points of a grid, for all compiled kernels but `ray_lookup.add_view` ---
+# --- linear interpolation between points of a grid, for all compiled kernels but `ray_lookup.add_view` ---
 #
-# Inlined before compiling: an array that is handed on has its references counted, by all threads at once.
+# Inlined before compiling: references to array arguments would be counted, by all threads at once.
 
 
 @_inlined
 def around(place, size):  # type: ignore[no-untyped-def]
-    """(first point, next point, way from the one to the other) of a place on points 0 … size − 1; ends go on."""
+    """(first point, next point, fraction between them) of a place on points 0 … size − 1; clamped to the ends."""
     place = min(max(place, 0.0), size - 1.0)
     first = min(int(place), max(size - 2, 0))
     return first, min(first + 1, size - 1), place - first
@@ -75,7 +76,7 @@ def around(place, size):  # type: ignore[no-untyped-def]
 
 @_inlined
 def bilinear(above, above_next, below, below_next, right, down):  # type: ignore[no-untyped-def]
-    """What lies between four points, 0 … 1 of the way to the right and down."""
+    """The value between four points, at fractions 0 … 1 to the right and down."""
     upper = above * (1 - right) + above_next * right
     lower = below * (1 - right) + below_next * right
     return upper * (1 - down) + lower * down

@@ -1,8 +1,8 @@
-"""Compiled loops of the fast engine for several masks on one light field: samples are read once for all of them.
+"""Compiled loops of the fast engine for several masks on one light field: samples are read once for all masks.
 
-A pixel's sum is taken apart into parts that all masks weigh otherwise: those of a view, where weights of views
-differ, or those that meet a line of a texture. The parts are summed first, without the masks, as `numba_kernels`
-sums rows; then each mask weighs them, and its row of sums is mixed across.
+The sum of a pixel is split into parts that each mask weighs differently: one part per view if weights of views
+differ, or one part per line of a texture. The parts are summed first, without the masks, as `numba_kernels` sums
+rows. Then each mask weighs them, and its row of sums is mixed across.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from vcc.engines.vector_sums import (
 from vcc.engines.vector_weights import MASKS, weigh_parted_rows, weigh_rows
 
 SPAN = 576
-"""Values of rows of samples that are summed before the next, about: with masks' lines they stay in the cache."""
+"""Approximate number of values of rows of samples to sum at a time: with lines of masks they stay in the cache."""
 
 _FAST = {"contract", "reassoc", "nsz"}
 _compiled = compiled(fastmath=_FAST)
@@ -35,17 +35,17 @@ _inlined = compiled(fastmath=_FAST, inline="always")
 
 @_compiled
 def add_column_of_views(samples, a, footprints, weights, masks, band, tiles):  # type: ignore[no-untyped-def]
-    """Add column a of view taps to a band of several rasters, which weigh its taps otherwise.
+    """Add column a of view taps to a band of several rasters, each with its own weights of taps.
 
-    samples: `Samples`. footprints: `Footprints`, whose weights are 0 of taps that no raster adds. weights:
-    (rasters, and some of zero to a multiple of four; rows of taps) float32. masks: `MaskLines`, or None. tiles:
+    samples: `Samples`. footprints: `Footprints`; their weights are 0 for taps that no raster uses. weights:
+    (rasters, padded with zeros to a multiple of four; rows of taps) float32. masks: `MaskLines`, or None. tiles:
     (rasters, rows / 8, columns · channels, 8).
     """
     looked_at, rows, (first_column, column_shares) = footprints
     values, begin, further, pitch, channels = samples
     used = np.flatnonzero(looked_at[:, a])
     count = used.size
-    # What each view adds to eight rows, one after the other; and, by four rasters, what each of them takes of it.
+    # Eight rows of sums for each view, one view after the other; and each raster's weights of them, in fours.
     of_views = np.empty((count * EIGHT, min(2 * SPAN, pitch)), np.float32)
     line = of_views.shape[1]
     order, ends, places = np.arange(count), np.zeros(10, np.int64), np.empty(count, np.int64)
@@ -78,13 +78,13 @@ def add_column_of_views(samples, a, footprints, weights, masks, band, tiles):  #
 
 @_inlined
 def _span(part, pitch):  # type: ignore[no-untyped-def]
-    """(first, after the last) of the values of a row that are summed together; the last part is longer."""
+    """(first, after the last) of the values of a row that are summed together; the last span is longer."""
     return part * SPAN, pitch if part + 1 >= pitch // SPAN else (part + 1) * SPAN
 
 
 @_inlined
 def _moved(weighed, entry, values):  # type: ignore[no-untyped-def]
-    """Look masks up so many values of a line further on."""
+    """Move the lookup of masks along their lines by this number of values."""
     for mask in range(weighed.places.shape[1]):
         for n in range(3):
             weighed.places[entry, mask, n] += values
@@ -94,14 +94,14 @@ def _moved(weighed, entry, values):  # type: ignore[no-untyped-def]
 def _sum_view(  # type: ignore[no-untyped-def]
     values, begin, pitch, length, b, gathered, masks, low, start, stop, sums, to
 ):
-    """What view tap b adds to raster row start + r, r = 0 … 7, goes to row r of the sums, from ``to`` on.
+    """Add view tap b's share of raster rows start + r, r = 0 … 7, to rows r of the sums, from row ``to`` on.
 
-    Of so many values of each row of samples, which begin at ``begin``, value ``low`` of row 0. gathered: `Rows`.
-    masks: `MaskLines`, or None.
+    ``length`` values of each row of samples; ``begin`` is the position of value ``low`` of row 0. gathered:
+    `Rows`. masks: `MaskLines`, or None.
     """
     reach = gathered.reach
     repeat = 1
-    if masks is not None:  # told apart when compiled
+    if masks is not None:  # resolved at compile time
         repeat, count = masks.repeat, masks.row_step.size
         weighed = EntryMasks(
             masks.lines, np.empty((reach, count, 3), np.int64), np.empty((reach, count, 3), np.float32)
@@ -118,7 +118,7 @@ def _sum_view(  # type: ignore[no-untyped-def]
                 places[entry] = begin + (top + entry) * pitch
                 r = lowest[entry]
                 ranges[entry] = -1 if r < 0 else r * ROWS - r * (r + 1) // 2 + highest[entry]
-                if masks is not None:  # told apart when compiled
+                if masks is not None:  # resolved at compile time
                     if masks_at(masks, b, top + entry, entry, weighed):
                         _moved(weighed, entry, low // repeat)
                     else:
@@ -136,7 +136,7 @@ def _sum_view(  # type: ignore[no-untyped-def]
 
 @_compiled
 def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # type: ignore[no-untyped-def]
-    """Add column a of view taps to a band of several rasters, which look the texture of a mask up elsewhere.
+    """Add column a of view taps to a band of several rasters, which differ in the texture of a mask.
 
     samples: `Samples`. footprints: `Footprints`. met: `ManyLines`. masks: the other masks, `MaskLines`, or None.
     tiles: (rasters, rows / 8, columns · channels, 8).
@@ -147,7 +147,7 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
     textures, height, line = met.lines.shape
     threes = met.repeat == 3
     room = begin.size * shares.shape[2]
-    if masks is not None:  # told apart when compiled
+    if masks is not None:  # resolved at compile time
         others = masks.row_step.size
         weighed = EntryMasks(
             masks.lines, np.empty((room, others, 3), np.int64), np.empty((room, others, 3), np.float32)
@@ -222,7 +222,7 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
 
 @_inlined
 def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: ignore[no-untyped-def]
-    """List the rows of samples that reach any of four lines from ``low`` on, sorted by which of them."""
+    """List the rows of samples that reach any of four lines from ``low`` on, sorted by range of lines."""
     order, ends, _, share = entries
     count = 0
     ends[:] = 0
@@ -255,9 +255,9 @@ def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: igno
 def mix_piece(values, taken, numbers, pictures, rows, columns):  # type: ignore[no-untyped-def]
     """pictures[n, top + y, left + x] = Σ_k numbers[n, taken[k]] · values[k, y · (right − left) + x].
 
-    values: (few, values) float32, a run at least, zeros behind the last. taken: (few,) int64. numbers: (pictures,
-    numbers) float32. pictures: (pictures, rows, values of a row) float32. rows: (top, bottom). columns: (left,
-    right), of values.
+    values: (few, values) float32, at least one run of values, zeros behind the last. taken: (few,) int64.
+    numbers: (pictures, numbers) float32. pictures: (pictures, rows, values of a row) float32. rows: (top,
+    bottom). columns: (left, right), in values.
     """
     (top, bottom), (left, right) = rows, columns
     few, length = values.shape

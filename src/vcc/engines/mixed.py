@@ -1,6 +1,6 @@
-"""Pictures as sums of a few pictures (`vcc.plan.footprints.mixtures`): products of matrices, piece by piece.
+"""Images as sums of a few images (`vcc.plan.footprints.mixtures`): matrix products, piece by piece.
 
-By compiled loops, and not by a library's: those bring threads of their own, which wait for each other by turning.
+Compiled loops compute them instead of a BLAS library, whose own threads would busy-wait for each other.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.protocol import OutputBuffers
 
 PIECE = 2**10
-"""Values of a picture that are made at once, at most, or a row of it: as many of the few stay in the cache."""
+"""Largest number of values computed at a time, or a row: these parts of the few images stay in the cache."""
 AT_ONCE = 2**25
-"""Bytes of pictures that are made together."""
+"""Size, in bytes, of the images computed together."""
 FEWEST = 8
-"""Pictures that are made together at least."""
+"""Least number of images computed together."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Piece(Brief):
-    """A rectangle of the sensor whose pixels take the same numbers.
+    """A rectangle of the sensor whose pixels use the same numbers.
 
     Args:
         rows: of pixels.
         columns: of pixels.
-        values: of the few pictures there, (pictures, values).
-        taken: which number counts for each of them.
+        values: of the few images there, (images, values).
+        taken: index of the number for each of them.
     """
 
     rows: slice
@@ -46,13 +46,13 @@ class Piece(Brief):
 
 
 class Mixer:
-    """What makes the pictures of a mixture.
+    """Computes the images of a mixture.
 
     Args:
-        mixture: how they are made.
-        pictures: those that its plans make, (rows, columns[, channels]).
-        threads: how many work at once. The same bytes for any number.
-        output_buffers: where pictures of cameras go; None allocates them here.
+        mixture: the sums.
+        pictures: images from its plans, (rows, columns[, channels]).
+        threads: number of threads; the bytes do not depend on it.
+        output_buffers: memory for the images of cameras; None allocates it here.
     """
 
     def __init__(
@@ -83,11 +83,11 @@ class Mixer:
         return Piece(rows, columns, values, taken.reshape(-1))
 
     def pictures(self) -> Iterator[NDArray[np.float32]]:
-        """The pictures of all members, in their order; some are made together and share their memory."""
+        """Yield the images of all members, in order; images that are computed together share memory."""
         members = len(self.numbers)
         count = max(AT_ONCE // (4 * math.prod(self.shape)), FEWEST)
         with Workers(self.threads) as pool:
-            # Some are made while those before them are looked at.
+            # The next images are computed while the caller uses those before them.
             made, done = self._begun(pool, 0, count)
             for first in range(count, members + count, count):
                 before, ready = made, done
@@ -96,7 +96,7 @@ class Mixer:
                 yield from before
 
     def _begun(self, pool: Workers, first: int, count: int) -> tuple[NDArray[np.float32], Iterator[None]]:
-        """Some of the pictures, and what says when they are done."""
+        """Start some of the images; return them, and an iterator that ends when they are done."""
         numbers = self.numbers[first : first + count]
         made = (
             self.output_buffers(self.members[first : first + count])
@@ -118,7 +118,7 @@ class Mixer:
 
 
 def _even(taken: NDArray[np.int64], most: int) -> list[slice]:
-    """Rows or columns of pixels in runs, at most so long, that take the same numbers."""
+    """Runs of at most ``most`` rows or columns of pixels that use the same numbers."""
     changes = np.flatnonzero((taken[1:] != taken[:-1]).any(axis=1)) + 1
     ends = [0, *changes.tolist(), len(taken)]
     return [

@@ -1,10 +1,10 @@
-"""The fast engine: the plan's sum in compiled loops over contiguous rows, on two or more CPU threads.
+"""The fast engine: the plan's sum in compiled loops over contiguous rows, on one or more CPU threads.
 
-All views of one column are first summed row by row in the columns of the samples, where memory is contiguous and
-every sample is converted once for four rows of the picture; then the sum is resampled across, eight rows side by
-side, once per column of views instead of once per view. Threads take bands of the picture's rows, so none waits
-for another and the result does not depend on how many there are. No 4-D intermediate is made: memory is a few
-bands of rows.
+All views of one column are first summed row by row, on the columns of the samples. Memory is contiguous there,
+and each sample is converted once for four rows of the image. The sum is then resampled across, eight rows at a
+time, once per column of views instead of once per view. Each thread works on bands of image rows: threads do not
+wait for each other, and the result does not depend on their number. No 4-D intermediate is made: a run needs
+memory for a few bands of rows.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ from vcc.plan.protocol import Gradient, Partial
 from vcc.plan.rays.model import Rays
 
 LONG = 256
-"""Weights of a filter along the axes from which on Fourier transforms are faster than the compiled pass."""
+"""Number of weights per axis above which Fourier transforms filter faster than the compiled pass."""
 SMALL = 2**17
-"""Numbers of a picture below which filtering it takes less time than starting threads for it."""
+"""Number of values of an image below which filtering takes less time than starting threads."""
 
 
 TURNS = 8
-"""Pictures that one thread interleaves, at most: what they read is then in its cache."""
+"""Largest number of images that one thread interleaves, so that the samples that they read stay in its cache."""
 TURNS_BYTES = 2**25
-"""Bytes of their rasters."""
+"""Largest size of the rasters of these images, in bytes."""
 
 
 def run(
@@ -75,11 +75,11 @@ def batch(
     pool: Workers,
     then: Callable[[int, Partial], Any],
 ) -> list[Any]:
-    """What follows from the rasters of several cores; see `vcc.plan.protocol.Engine`.
+    """Process the rasters of several cores; see `vcc.plan.protocol.Engine`.
 
-    Footprints that differ only in the weights of views or in the texture of one mask are made in one pass over the
-    samples. Others are made side by side, each by one thread: nothing waits for the slowest of several at the end
-    of each. The bytes are the same for any number of threads.
+    Footprints that differ only in the weights of views or in the texture of one mask are summed in one pass over
+    the samples. Otherwise each core runs on one thread, several cores at a time, so that threads do not wait for
+    the slowest one at the end of each core. The bytes are the same for any number of threads.
     """
     footprints = [core for core in cores if isinstance(core, Footprints)]
     alike = len(footprints) == len(cores)
@@ -110,10 +110,10 @@ def back(
     threads: int,
     progress: Progress | None = None,
 ) -> Gradient:
-    """What a raster's weights say of samples, float32, and of numbers; see `vcc.plan.protocol.Engine`.
+    """Gradients of a weighted raster to samples (float32) and parameters; see `vcc.plan.protocol.Engine`.
 
-    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
-    what rays carry to them, too: that belongs to the neighbours, and is left to them.
+    If part of a core runs with a border of dark views (`vcc.run.drive`), the border's samples also receive
+    gradients from the rays. These belong to the neighbouring parts; the caller drops them.
     """
     if isinstance(core, Rays):
         to_samples = partial(ray_transpose.scattered, core, values.shape, raster, beside, threads)
@@ -128,9 +128,9 @@ def back(
 def prepared(
     before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
 ) -> NDArray[Any] | sharpening_kernels.ToSharpen:
-    """Samples as a core takes them: what is sharpened is so by compiled loops, to the bit as plainly.
+    """Samples as a core reads them. Compiled loops sharpen them, with the same bits as `SharpenViews.apply`.
 
-    Rays of a plain lens sharpen what they look at.
+    Rays of a plain lens sharpen only the patches that they read (`ToSharpen`).
     """
     if isinstance(core, Rays) and len(before) == 1 and isinstance(before[0], operators.SharpenViews):
         found = sharpening_kernels.ToSharpen(before[0].weights, values)
@@ -166,7 +166,7 @@ def prepared_back(
 def _blurred_back(
     operator: operators.BlurViews, values: NDArray[np.floating], threads: int
 ) -> NDArray[np.float32]:
-    """The transpose of views blurred, several at a time."""
+    """The transpose of `BlurViews`, several views at a time."""
     (high, wide), (nv, nu, nt, ns, *channels) = operator.kernel.shape, values.shape
     found = np.empty((nv, nu, nt - high + 1, ns - wide + 1, *channels), dtype=np.float32)
 
@@ -179,9 +179,9 @@ def _blurred_back(
 
 
 def finished(after: Sequence[operators.After], raster: NDArray[Any], threads: int) -> NDArray[np.float32]:
-    """The picture (rows, columns, channels), float32, of a raster (rows, columns, channels).
+    """The image (rows, columns, channels), float32, from a raster (rows, columns, channels).
 
-    Short filters along the axes and what lies against the sensor are done in one pass.
+    Short filters along the axes and masks against the sensor are applied in one pass.
     """
     match list(operators.merged(after)):
         case []:
@@ -213,14 +213,14 @@ def _in_one_pass(
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
-    """Bytes that a run takes beside the samples and the raster, estimated."""
+    """Estimated bytes that a run needs besides the samples and the raster."""
     if isinstance(core, Rays):
-        # Once in the core's steps and once as the kernel reads them; a single large table is not copied.
+        # Once in the core's steps, once packed for the kernel; a single large table is not copied.
         return int(core.points.nbytes + 2 * core.tables_bytes)
     line = 4 * channels * core.samples[1] * core.refine
     raster = 4 * channels * math.prod(core.raster_shape)
     band = band_height(line)
-    # A band's sums, eight of them turned, and the rows of a view where its samples are divided.
+    # A band's sums, eight transposed rows, and the rows of a view if its samples are divided.
     thread = (band + EIGHT + (2 * band if core.refine > 1 else 0)) * line
     masks = sum(mask.texture.nbytes + len(mask.texture) * line for mask in core.masks)
     return threads * thread + 2 * raster + masks
@@ -229,7 +229,7 @@ def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
 def _sheared(
     core: Footprints, values: NDArray[Any], channels: int, pool: Workers, progress: Progress | None
 ) -> NDArray[np.float32]:
-    """The raster (rows, columns × channels) where rows and columns do not part."""
+    """The raster (rows, columns × channels) if rows and columns are not separable."""
     raster = np.zeros((*core.raster_shape, channels), dtype=np.float32)
     fine = FineGrid(core)
     grid, footprint = on_raster(core, fine)
@@ -238,7 +238,7 @@ def _sheared(
         tell(progress, done, core.taps_used)
         samples = fine.divided(values[core.view_rows[b], core.view_columns[a]].reshape(*core.samples, -1))
         if core.masks:
-            samples = samples.copy()  # to be weighed
+            samples = samples.copy()  # the masks are multiplied in place
         view = view_of(core, b, a, samples, core.weights)
         if core.masks:
             list(pool.map(partial(kernels.weigh_samples, view, grid, masks), bands(len(samples))))

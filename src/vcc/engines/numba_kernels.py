@@ -1,7 +1,7 @@
-"""Compiled loops of the fast engine. Each is a plain function of arrays, so that it can be read and timed alone.
+"""Compiled loops of the fast engine: plain functions of arrays that can be read and timed separately.
 
-Compiled once for each type of samples and kept on disk (`vcc.engines.compiled`). They release the interpreter's
-lock; the threads are Python's own.
+They are compiled once for each type of samples and cached on disk (`vcc.engines.compiled`). They release the
+GIL; the threads are Python threads.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from vcc.engines.vector_sums import (
 )
 
 VIEWS = 8
-"""Views that are summed at once: more would be more runs of memory at once than a processor foresees."""
+"""Views summed at once. More would be more concurrent streams of memory than the processor prefetches."""
 
 # Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
 _FAST = {"contract", "reassoc", "nsz"}
@@ -36,12 +36,11 @@ _inlined = compiled(fastmath=_FAST, inline="always")
 def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore[no-untyped-def]
     """sums[y − band.start] += the rows of all views of one column that fall on raster row y, times their masks.
 
-    lines: `Lines`. used: the taps that are added; weights: (taps,). gathered: `Rows`. masks: `MaskLines`, or None.
+    lines: `Lines`. used: the taps to add; weights: (taps,). gathered: `Rows`. masks: `MaskLines`, or None.
 
-    Four raster rows are summed at a time, so that each sample is converted and weighed once for all of them. The
-    raster is walked along so that samples are read in the order in which they lie in memory (a real image runs
-    against its samples), and what is needed next is asked for beforehand, since many short runs are more than a
-    processor foresees by itself.
+    Four raster rows are summed at a time, so that each sample is converted and weighed once for all four. The
+    loop over the raster follows the memory order of the samples (a real image is inverted, so their rows run in
+    opposite directions). The next rows are prefetched explicitly: processors do not prefetch many short runs.
     """
     samples, begin, pitch, jump = lines
     first, reach, advance = gathered.first, gathered.reach, gathered.advance
@@ -49,7 +48,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
     group = min(VIEWS, used.size)
     room = group * reach
     repeat = 1
-    if masks is not None:  # told apart when compiled: without masks there is less to compile
+    if masks is not None:  # resolved at compile time: less to compile without masks
         repeat, count = masks.repeat, masks.row_step.size
         weighed = EntryMasks(
             masks.lines, np.empty((room, count, 3), np.int64), np.empty((room, count, 3), np.float32)
@@ -74,10 +73,10 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                 for q in range(rows):
                     entry, l = listed + q, top + q
                     places[entry] = begin[b] + l * pitch
-                    # Ranges are numbered 00 01 02 03 11 12 13 22 23 33; −1: nothing is added.
+                    # Ranges are numbered 00 01 02 03 11 12 13 22 23 33; −1 adds nothing.
                     low = lowest[q]
                     ranges[entry] = -1 if low < 0 else low * ROWS - low * (low + 1) // 2 + highest[q]
-                    if masks is not None:  # noqa: SIM102  (by itself, so that it can be told apart when compiled)
+                    if masks is not None:  # noqa: SIM102  (a separate condition is resolved at compile time)
                         if not masks_at(masks, b, l, entry, weighed):
                             ranges[entry] = -1
                 listed += rows
@@ -105,10 +104,10 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
 
 @_inlined
 def rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
-    """List the rows of samples of tap b that fall on four raster rows from y on: the first, and how many.
+    """List the rows of samples of tap b that fall on four raster rows from y on: returns (first row, count).
 
-    Row ``first + q`` counts ``share[entry + q]`` there, and reaches raster rows y + lowest[q] … y + highest[q];
-    lowest[q] is −1 if it reaches none.
+    Row ``first + q`` has the shares ``share[entry + q]`` there, and reaches raster rows y + lowest[q] … y +
+    highest[q]; lowest[q] is −1 if it reaches none.
     """
     first, shares = gathered.first, gathered.shares
     rows = min(ROWS, stop - y)
@@ -132,9 +131,9 @@ def rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # typ
 
 @_inlined
 def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
-    """Look up the masks' three lines around row l of the samples of tap b; False if it is dark there.
+    """Look up three lines of each mask around row l of the samples of tap b; False if the row is dark.
 
-    masks: `MaskLines`. weighed: `EntryMasks`, which is filled for the entry.
+    masks: `MaskLines`. weighed: `EntryMasks`, filled for this entry.
     """
     lines, begin, rows, row, row_step, _ = masks
     _, places, shares = weighed
@@ -145,7 +144,7 @@ def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
             return False
         r, above, here, below = three_around(place)
         last = rows[mask] - 1
-        # Outside the texture there is no light: a weight of zero on any row that exists.
+        # Dark outside the texture: a weight of zero on any existing row.
         shares[entry, mask, 0] = above if r > 0 else 0
         shares[entry, mask, 1] = here if 0 <= r <= last else 0
         shares[entry, mask, 2] = below if r < last else 0
@@ -157,7 +156,7 @@ def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
 
 @_inlined
 def sort_by_range(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
-    """Order the entries by range; ``ends`` counts those of each range and the ones before it."""
+    """Sort the entries by range; ``ends`` is the number of entries in each range and all earlier ones."""
     ends[:] = 0
     for entry in range(entries):
         if ranges[entry] >= 0:
@@ -175,7 +174,7 @@ def sort_by_range(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
 
 @_compiled
 def add_columns(samples, columns, footprints, masks, band, tiles):  # type: ignore[no-untyped-def]
-    """Add columns of view taps, one after the other, to the raster rows of a band.
+    """Add columns of view taps, one after the other, to a band of raster rows.
 
     samples: `Samples`. columns: (first, end). footprints: `Footprints`. masks: `MaskLines`, or None. tiles: the
     raster, (rows / 8, columns · channels, 8).
@@ -195,9 +194,9 @@ def add_columns(samples, columns, footprints, masks, band, tiles):  # type: igno
 
 @_compiled
 def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # type: ignore[no-untyped-def]
-    """As `add_columns` for column a, whose samples are divided into finer ones, view by view; fine: `FineSamples`.
+    """As `add_columns` for column a, whose samples are subdivided view by view; fine: `FineSamples`.
 
-    The rows that raster rows gather, and the masks, are those of the finer samples.
+    ``footprints`` and ``masks`` refer to the finer samples.
     """
     weights, rows, (first_column, column_shares) = footprints
     begin, channels = samples.begin, samples.channels
@@ -220,8 +219,8 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
 
 @_inlined
 def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
-    """(first, after the last) of the rows of samples of tap b that fall on a band; first is ``low`` for none."""
-    # Not a literal 0: what is given it would be compiled twice, for literals and for numbers.
+    """(first, after the last) row of samples of tap b that falls on a band; first is ``low`` if there is none."""
+    # Not a literal 0: Numba would compile functions called with it twice, for literals and for numbers.
     first, shares, high = gathered.first, gathered.shares, np.int64(0)
     for y in range(band.start, band.stop):
         for t in range(shares.shape[2]):
@@ -232,7 +231,7 @@ def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
-    """Sums of a band's rows, to be set to zero, and eight of them turned, with zeros beyond the last sample."""
+    """Buffers: the sums of a band's rows (not zeroed), and eight transposed rows, zero beyond the last sample."""
     rows = band.stop - band.start
     sums = np.empty(((rows + EIGHT - 1) // EIGHT * EIGHT, pitch), np.float32)
     return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
@@ -240,10 +239,10 @@ def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
 
 @_compiled
 def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
-    """divided[l − low] = row l of a view's finer samples, from ``low`` to before ``high``; begin: of the view."""
+    """divided[l − low] = row l of a view's finer samples, for low ≤ l < high; begin: where the view begins."""
     values, _, _, pitch, channels = samples
     first_row, row_shares, first_column, column_shares, _ = fine
-    source = np.zeros(pitch + column_shares.shape[1] * channels, np.float32)  # and zero beyond a row's last sample
+    source = np.zeros(pitch + column_shares.shape[1] * channels, np.float32)  # zero beyond a row's last sample
     for l in range(low, high):
         source[:pitch] = 0
         for t in range(row_shares.shape[1]):
@@ -274,9 +273,9 @@ def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped
 
 @_inlined
 def columns_around(column, columns):  # type: ignore[no-untyped-def]
-    """Three of so many columns around each place, (3, places), and what they count there, float32.
+    """The three columns around each place, (3, places), and their weights there, float32.
 
-    Around the columns it is dark, by weights of zero on columns that exist.
+    Outside the ``columns`` it is dark: weights of zero on existing columns.
     """
     points, counts = np.empty((3, column.size), np.uint64), np.empty((3, column.size), np.float32)
     last = columns - 1
@@ -310,9 +309,9 @@ def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untype
 def mix_columns(sums, first, shares, channels, turned, tiles):  # type: ignore[no-untyped-def]
     """tiles[i, x · channels + c, y] += Σ share · sums[8i + y, k · channels + c] over samples k that reach x.
 
-    sums: (rows, pitch), a multiple of 8 of them. Eight rows are turned to stand side by side, so that they are
-    mixed alike wherever a column's samples begin; turned is the room for it, zero beyond the last sample. first:
-    (columns,), shares: (columns, width).
+    sums: (rows, pitch), a multiple of 8 rows. Eight rows are transposed, so that the same vector code mixes them
+    whatever the first sample of a column. turned: buffer for them, zero beyond the last sample. first:
+    (columns,). shares: (columns, width).
     """
     step, pitch = EIGHT * channels, sums.shape[1]
     for tile in range(len(sums) // EIGHT):
@@ -329,7 +328,7 @@ def mix_columns(sums, first, shares, channels, turned, tiles):  # type: ignore[n
 
 @_compiled
 def raster_of(tiles, channels, mirrored, band, raster):  # type: ignore[no-untyped-def]
-    """A band's rows of the raster, (rows, columns · channels), from its tiles as `mix_columns` has them."""
+    """Copy a band's rows of the raster, (rows, columns · channels), from tiles in the layout of `mix_columns`."""
     start, stop = band
     columns = raster.shape[1] // channels
     for tile in range(start // EIGHT, (stop + EIGHT - 1) // EIGHT):
@@ -343,10 +342,10 @@ def raster_of(tiles, channels, mirrored, band, raster):  # type: ignore[no-untyp
 
 @_compiled
 def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
-    """A band's rows of the picture: the raster convolved down and across, less its guard, times transmission.
+    """A band's rows of the image: the raster convolved down and across, cropped by its guard, times transmission.
 
     raster: (rows, columns · channels), dark beyond its border. finish: `Finish`. picture: (rows, columns ·
-    channels), each side by its guard smaller.
+    channels), the raster without its guard.
     """
     down, across, channels, guard, transmission = finish
     rows, n = raster.shape
@@ -377,7 +376,7 @@ def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
 
 @_inlined
 def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
-    """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 a spline, 4 a box."""
+    """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 spline, 4 box."""
     r = abs(a)
     if interpolation == 4:
         half = min(r, 0.5)
@@ -396,7 +395,7 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
 
 @_inlined
 def share_at(footprint, offset, size):  # type: ignore[no-untyped-def]
-    """What a pixel holds of a sample's light that falls so far from it, the samples so far apart."""
+    """Share of a sample's light on a pixel at distance ``offset``; ``size`` is the distance of the samples."""
     interpolation, _, opening = footprint
     if interpolation == 0:
         reach = max(size, 1.0) / 2
@@ -407,13 +406,13 @@ def share_at(footprint, offset, size):  # type: ignore[no-untyped-def]
 
 @_inlined
 def farthest(footprint, size):  # type: ignore[no-untyped-def]
-    """How far from a pixel a sample may fall that counts there, in pixels."""
+    """Largest distance from a pixel, in pixels, at which a sample contributes to it."""
     return 1e-6 + (max(size, 1.0) / 2 if footprint.interpolation == 0 else footprint.reach * size + 0.5)
 
 
 @_compiled
 def weigh_samples(view, grid, masks, band):  # type: ignore[no-untyped-def]
-    """Multiply a band of rows of a view's samples by what masks let pass, in place, where rows and columns shear.
+    """Multiply a band of rows of a view's samples by the masks, in place, if rows and columns are sheared.
 
     view: `View`. grid: `Grid`. masks: `Textures`.
     """
@@ -434,7 +433,7 @@ def weigh_samples(view, grid, masks, band):  # type: ignore[no-untyped-def]
 
 @_compiled
 def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untyped-def]
-    """Add one view to a band's raster rows, (rows, columns, channels), where rows and columns of samples shear.
+    """Add one view to a band's raster rows, (rows, columns, channels), if rows and columns of samples are sheared.
 
     view: `View`. grid: `Grid`. footprint: `Footprint`.
     """

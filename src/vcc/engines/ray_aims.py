@@ -1,7 +1,7 @@
-"""Where the rays of a pixel start, and the window of a stop or the cells of an array at which they are aimed.
+"""Where the rays of a pixel start, and how they are aimed: at the window of a stop, or through cells of an array.
 
-And the way back, to the numbers of the sensor, the window and the cells; `vcc.plan.rays.aim_backwards` explains
-these derivatives.
+Also the backward pass, to the parameters of the sensor, the window and the cells; `vcc.plan.rays.aim_backwards`
+explains these derivatives.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from vcc.engines.ray_steps import cell_of, centre_of
 from vcc.plan.rays.points import DIGITS
 
 DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
-"""What takes a point to its digits as a whole number, and back."""
+"""Factors from a point to its digits as an integer, and back."""
 
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
 _inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Of what compiled code alone calls: no way for Python to call it is compiled."""
+"""Called by compiled code only: no wrapper for Python is compiled."""
 _back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they run on several rays at once."""
+"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 
 
 @_inner
@@ -35,14 +35,14 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
 
 @_inlined
 def first_point(points, pixel):  # type: ignore[no-untyped-def]
-    """Where in their table the points begin that a pixel takes; see `vcc.plan.rays.model.Rays.block`."""
+    """Where the points of a pixel begin in their table; see `vcc.plan.rays.model.Rays.block`."""
     table, samples, beside, seed = points
     return ((np.int64(hashed(pixel, seed)) * (table.shape[1] // samples) >> 32) ^ beside) * samples
 
 
 @_inlined
 def middle_of(sensor, row, column):  # type: ignore[no-untyped-def]
-    """The place (x, y) of the middle of a pixel."""
+    """The position (x, y) of the centre of a pixel."""
     return sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
 
 
@@ -54,7 +54,7 @@ def unit(point, flipped):  # type: ignore[no-untyped-def]
 
 @_inner
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
-    """Places of a packet's rays over the sensitive area of a pixel."""
+    """Set the positions of a packet's rays on the sensitive area of a pixel."""
     points, start, n, flipped = drawn
     x, y = rays.x, rays.y
     (middle_x, middle_y), (wide, high) = middle, sensitive
@@ -66,7 +66,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
 
 @_inner
 def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
-    """(power, δs, δt) of a cell; divisions are spared where there is one kind, the usual case."""
+    """(power, δs, δt) of a cell; no divisions if there is one kind, the usual case."""
     rows, columns = kinds.shape[0], kinds.shape[1]
     one = rows * columns == 1
     r, c = (0, 0) if one else (row % rows, column % columns)
@@ -75,7 +75,7 @@ def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
 
 @_inlined
 def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
-    """Numbers by which `through_cell` finds the stop's image seen through a cell, along one axis, and the cell."""
+    """Set the numbers from which `through_cell` computes the stop's image seen through a cell, along one axis."""
     gain = cells.beyond[axis] + power * cells.beyond_from_slope[axis]
     if abs(gain) < 1e-12:
         gain = 1e-12
@@ -90,13 +90,13 @@ def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-unty
 
 @_inner
 def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
-    """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; returns how many."""
+    """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; return the count."""
     beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
     offset, middle, half, cell_half = cells.beyond_offset, cells.middle, cells.half, cells.cell_half
     centre_x = (middle[0] - offset[0] - from_sensor[0] * x) / beyond[0]
     centre_y = (middle[1] - offset[1] - from_sensor[1] * y) / beyond[1]
     row, column, _, _ = cell_of(cells.layout, cells.turn, centre_x, centre_y)
-    # The place p(a) = gain·a + rest at the stop, over the cell and the pixel, must meet the stop.
+    # The position p(a) = gain·a + rest at the stop, over the cell and the pixel, must be inside the stop.
     loose_x, loose_y = abs(from_sensor[0]) * sensitive[0] / 2, abs(from_sensor[1]) * sensitive[1] / 2
     rest_x = from_sensor[0] * x + offset[0] - middle[0]
     rest_y = from_sensor[1] * y + offset[1] - middle[1]
@@ -105,7 +105,7 @@ def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
         for c in range(column - cells.reach[1], column + cells.reach[1] + 1):
             centre_x, centre_y = centre_of(cells.layout, cells.turn, r, c)
             power, slope_x, slope_y = kind_of(cells.kinds, r, c)
-            # At the centre the cell's lens does nothing: there p is beyond·centre + rest.
+            # At its centre the cell's lens does not deflect: there p is beyond·centre + rest.
             gain = abs(beyond[0] + power * from_slope[0])
             off = abs(beyond[0] * centre_x + rest_x - from_slope[0] * slope_x)
             seen = off <= half[0] + (gain * cell_half[0] + loose_x) * (1 + 1e-9)
@@ -119,7 +119,7 @@ def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
 
 @_inlined
 def cells_at(by_cell, cells, middle, sensitive, near):  # type: ignore[no-untyped-def]
-    """Fill ``near`` with the cells that a pixel is traced through; returns how many, 1 where there is a window."""
+    """Fill ``near`` with the cells that a pixel is traced through; return their number, 1 for a window."""
     seen = 1
     if by_cell:
         seen = cells_seen(cells, middle[0], middle[1], sensitive, near)
@@ -128,7 +128,7 @@ def cells_at(by_cell, cells, middle, sensitive, near):  # type: ignore[no-untype
 
 @_inlined
 def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ignore[no-untyped-def]
-    """Set what is drawn for a pixel, and for its cell ``q`` of those that `cells_at` found, where that is."""
+    """Set the digits to flip for a pixel, and the stop's image for cell ``q`` of ``near`` if there are cells."""
     number = np.int64(pixel)
     if by_cell:
         number ^= np.int64(hashed(near[q, 0] * 65537 + near[q, 1], seed))
@@ -142,13 +142,13 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
 
 @_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
-    """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, making up for diffusers."""
+    """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, with diffusers compensated."""
     points, start, n, flipped = drawn
     from_point, from_sensor, (f4, g4), solid_angle, disc, scatter = window
     x, y, s, t, share = rays
     f0, f1, f2, f3 = from_point[0, 0], from_point[0, 1], from_sensor[0, 0], from_sensor[0, 1]
     g0, g1, g2, g3 = from_point[1, 0], from_point[1, 1], from_sensor[1, 0], from_sensor[1, 1]
-    if disc:  # turned
+    if disc:  # rotated
         turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
         cosine, sine = math.cos(turn), math.sin(turn)
         f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
@@ -172,10 +172,10 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
 
 @_inner
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
-    """Slopes and weights of rays through what of a cell the stop is seen through; see `CellWindows.aimed`.
+    """Slopes and weights of rays through the part of a cell that sees the stop; see `CellWindows.aimed`.
 
-    ``images``: (2, 5), see `set_image`. Until the last loop, s holds places across, t and share the ends of what
-    is seen there.
+    ``images``: (2, 5), see `set_image`. Until the last loop, s holds positions across, t and share the ends of
+    the visible part there.
     """
     points, start, n, flipped = drawn
     x, y, s, t, share = rays
@@ -183,7 +183,7 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     middle_y, along_y, half_y, centre_y = images[1, 0], images[1, 1], images[1, 2], images[1, 3]
     radius, borders = cells.opening_radius, cells.borders
     across, down = np.int32(flipped[2]), np.int32(flipped[3])
-    per_half = cells.disc / half  # of a rectangle all chords are alike
+    per_half = cells.disc / half  # all chords of a rectangle are equal
     for p in range(n):
         image = middle + along * x[p]
         low = max(image - half, centre - reach)
@@ -217,7 +217,7 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
 
 @_inlined
 def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-untyped-def]
-    """A packet's rays at the sensor, through the window or the cell at which they are aimed."""
+    """Start a packet's rays at the sensor and aim them at the window or through the cell."""
     at_pixel(drawn, middle, sensitive, rays)
     if aim.by_cell:
         through_cell(drawn, images, aim.cells, rays)
@@ -225,12 +225,12 @@ def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-un
         through_window(drawn, aim.window, rays)
 
 
-# --- and back ---
+# --- backward ---
 
 
 @_back
 def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
-    """What places of a pixel's rays on the sensor say of its first pixel, pitch and sensitive area."""
+    """Gradients of the rays' positions on the sensor to its first pixel, pitch and sensitive area."""
     points, start, n, flipped = drawn
     for q in range(2):
         digits, number = np.int32(flipped[q]), place[1 - q]
@@ -245,7 +245,7 @@ def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
 
 @_back
 def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type: ignore[no-untyped-def]
-    """What slopes and weights of rays through a window say of places, of what was drawn, and of its numbers."""
+    """Gradients of slopes and weights through a window to positions, drawn points and its parameters."""
     points, start, n, flipped = drawn
     _, from_sensor, _, _, disc, scatter = window
     turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
@@ -293,11 +293,11 @@ def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type:
 
 @_back
 def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[no-untyped-def]
-    """What slopes and weights of rays through a cell say of places, of the stop's image there and of the cell.
+    """Gradients of slopes and weights through a cell to positions, to the stop's image there and to the cell.
 
-    Line by line what `vcc.plan.rays.aim_backwards` says of `CellWindows.aimed`. Sums: of cotangents of an image's
-    middle, of these times the place, of its half size, of the cell's centre. ``of_cells``: (cells, kinds, borders)
-    of `vcc.engines.ray_tables.RayGradients`, and room for the sums, (2, 4).
+    Follows `vcc.plan.rays.aim_backwards` for `CellWindows.aimed` line by line. Sums: of cotangents of an image's
+    middle, of these times the position, of its half size, of the cell's centre. ``of_cells``: (cells, kinds,
+    borders) of `vcc.engines.ray_tables.RayGradients`, and a buffer for the sums, (2, 4).
     """
     points, start, n, flipped = drawn
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
@@ -320,7 +320,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
         off = (a - image) / half
         root = math.sqrt(max(1.0 - off * off, 0.0)) if disc else 1.0
         away = a - centre
-        # 0: the image's end; −1: the round opening's; else a strip's.
+        # Which border ends the chord. 0: the image; −1: the round opening; else a strip.
         top, bottom, by_top, by_bottom = image_y - half_y * root, image_y + half_y * root, 0, 0
         for strip in range(len(borders)):
             border, tall = centre_y + borders[strip, 0] * away, borders[strip, 1]
@@ -406,7 +406,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
 
 @_back
 def image_back(images, cells, cell, sums, own, kinds):  # type: ignore[no-untyped-def]
-    """What the sums of `cell_back` say of the numbers by which `set_image` finds a cell's image."""
+    """Gradients from the sums of `cell_back` to the numbers from which `set_image` computes a cell's image."""
     power, slope_x, slope_y = kind_of(cells.kinds, cell[0], cell[1])
     kind = kinds[cell[0] % kinds.shape[0], cell[1] % kinds.shape[1]]
     for axis in range(2):

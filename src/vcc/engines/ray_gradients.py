@@ -1,7 +1,7 @@
-"""What a raster by rays says of the plan's numbers, by the compiled kernel, on several threads.
+"""Gradients of a raster by rays to the plan's parameters, with the compiled kernel, on several threads.
 
-Tiles of the picture are parted into groups, the same whatever the number of threads. Each group has sums of its
-own, which are added in the order of the groups: so the numbers are the same to the bit.
+Tiles of the image are divided into groups that do not depend on the number of threads. Each group has its own
+sums, which are added in the order of the groups: the results are the same to the bit for any number of threads.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from vcc.plan.rays.model import Rays
 Array = NDArray[np.float64]
 
 GROUPS = 64
-"""Groups of tiles at most."""
+"""Largest number of groups of tiles."""
 GROUPS_BYTES = 2**26
-"""Of the sums of all groups, if possible: where tables are large there are fewer groups, and fewer threads."""
+"""Memory limit for the sums of all groups: large tables mean fewer groups, and fewer threads."""
 
 
 def ray_gradients(
@@ -41,24 +41,24 @@ def ray_gradients(
     threads: int = 1,
     progress: Progress | None = None,
 ) -> dict[str, Array]:
-    """The derivative of ⟨raster, what rays make of the samples⟩ to numbers of the core.
+    """The derivative of ⟨raster, raster of the samples⟩ to parameters of the core.
 
-    See `vcc.engines.reference_ray_gradients.ray_gradients`; the same numbers for any number of threads.
+    See `vcc.engines.reference_ray_gradients.ray_gradients`; the same bytes for any number of threads.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         values: samples (v, u, t, s[, channels]).
-        raster: weights of the picture's values, (rows, columns, channels).
-        wanted: names of numbers (`vcc.plan.parameters.numbers` of the core).
-        beside: 0, or 1 for the blocks of points beside those of the first round.
-        threads: how many work at once.
+        raster: weights of the raster's values, (rows, columns, channels).
+        wanted: names of parameters (`vcc.plan.parameters.numbers` of the core).
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
+        threads: number of threads.
         progress: called with (done, total) in pixels.
 
     Returns:
-        For each name an array of its number's shape.
+        An array for each name, of the parameter's shape.
 
     Raises:
-        InputError: a number that moves nothing but a hard edge which rays run into.
+        InputError: a parameter that only moves a hard edge which rays meet.
     """
     edges.check_no_edge(core, wanted)
     shapes = {name: number.shape for name, number in parameters(core).items()}
@@ -88,7 +88,7 @@ def ray_gradients(
 
 
 def _groups(raster_shape: tuple[int, int], size: int) -> list[NDArray[np.int64]]:
-    """Tiles (first row, end row, first column, end column), some at a time: (tiles, 4) each."""
+    """Groups of tiles (first row, end row, first column, end column): (tiles, 4) each."""
     rows, columns = raster_shape
     tiles = np.array(
         [(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)], dtype=np.int64
@@ -97,7 +97,7 @@ def _groups(raster_shape: tuple[int, int], size: int) -> list[NDArray[np.int64]]
 
 
 def _nothing(core: Rays, packed: tables.Steps, wanted: set[str]) -> tables.RayGradients:
-    """Sums of nothing yet, with those of tables where they are wanted."""
+    """Sums of zero; those of tables only if requested."""
     last = {name.rsplit(".", 1)[-1] for name in wanted if name.startswith("steps[")}
     by_shares = any(name.endswith((".values", ".texture.values")) for name in wanted)
     aim = core.aim
@@ -121,7 +121,7 @@ def _nothing(core: Rays, packed: tables.Steps, wanted: set[str]) -> tables.RayGr
 
 
 def _matrices(core: Rays) -> Array:
-    """The affine maps of steps that are such, (steps, 20)."""
+    """The maps of affine steps, (steps, 20); zero for other steps."""
     matrices = np.zeros((len(core.steps), 20))
     for n, step in enumerate(core.steps):
         if isinstance(step, steps.Move):
@@ -130,7 +130,7 @@ def _matrices(core: Rays) -> Array:
 
 
 def _named(core: Rays, packed: tables.Steps, gradients: tables.RayGradients) -> dict[str, Array]:
-    """The derivatives by the numbers' names, tables left out that were not summed."""
+    """The derivatives by parameter name, without tables that were not summed."""
     named = {
         "first_pixel": gradients.sensor[:2],
         "pitch": gradients.sensor[2:4],
@@ -150,7 +150,7 @@ def _named(core: Rays, packed: tables.Steps, gradients: tables.RayGradients) -> 
 
 
 def _square(matrix: Array) -> Array:
-    """5×5 of the first four rows."""
+    """A 5×5 matrix from its first four rows; the last row is zero."""
     return np.concatenate([matrix, np.zeros(5)]).reshape(5, 5)
 
 
@@ -199,7 +199,7 @@ def _of_lattice(pitch: float, sums: Array) -> dict[str, Array]:
 
 
 def _of_step(step: steps.Step, whole: list[int], gradients: tables.RayGradients, own: Array) -> dict[str, Array]:
-    """What a step's sums say of its numbers; ``whole`` is what the kernel was given of it."""
+    """Derivatives to a step's parameters from its sums; ``whole``: its integers, as packed for the kernel."""
     match step:
         case steps.Move():
             return {"before_from_behind": _square(own)}

@@ -1,7 +1,7 @@
-"""What rays find in the light field, what they hand back to its samples, and the derivative of what they find.
+"""Look up rays in the light field, the transpose of this, and its derivative.
 
-A ray lies between four views, and in each of them between four samples. Which they are and what they count stands
-once, for the three ways and for the GPU.
+A ray falls between four views, and in each view between four samples. These and their weights are defined once,
+for all three functions and for the GPU.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add
 _compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
 _inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Of what compiled code alone calls: no way for Python to call it is compiled."""
+"""Called by compiled code only: no wrapper for Python is compiled."""
 _back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they run on several rays at once."""
+"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 
 
 @_inner
 def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
-    """Replace the places and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
+    """Replace the positions and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
     x, y, s, t, _ = rays
     if m[0, 1] == m[0, 3] == m[1, 0] == m[1, 2] == m[2, 1] == m[2, 3] == m[3, 0] == m[3, 2] == 0.0:
         a, b, c, d, e, f = m[0, 0], m[0, 2], m[0, 4], m[2, 0], m[2, 2], m[2, 4]
@@ -47,9 +47,9 @@ def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
 
 @_inlined
 def views_of_ray(i, j, nu, nv, between):  # type: ignore[no-untyped-def]
-    """The first of the views that a ray lies between, (i0, j0), and how near it is to the next ones, (fi, fj).
+    """The first of the views around a ray, (i0, j0), and the fraction of the way to the next ones, (fi, fj).
 
-    Where views are not interpolated, the one that it lies in, and 0.
+    If views are not interpolated: the nearest view, and 0.
     """
     ci, cj = min(max(i, 0.0), nu - 1.0), min(max(j, 0.0), nv - 1.0)
     if between:
@@ -60,13 +60,13 @@ def views_of_ray(i, j, nu, nv, between):  # type: ignore[no-untyped-def]
 
 @_inlined
 def dark_from(motion):  # type: ignore[no-untyped-def]
-    """How far outside the pictures, in samples (k, l), all views that a ray is between are dark."""
+    """How far outside the views, in samples (k, l), all views around a ray are dark."""
     return 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1])), 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
 
 
 @_inlined
 def may_find_light(i, j, k, l, views, dark):  # type: ignore[no-untyped-def]
-    """Whether a ray meets the grid of views, and their pictures or what is less than ``dark`` beside them."""
+    """Whether a ray meets the grid of views, and falls on their pixels or less than ``dark`` outside them."""
     nv, nu, nt, ns = views
     if not (i >= -0.5 and i <= nu - 0.5 and j >= -0.5 and j <= nv - 0.5):
         return False
@@ -75,12 +75,12 @@ def may_find_light(i, j, k, l, views, dark):  # type: ignore[no-untyped-def]
 
 @_inlined
 def corners_in_four_views(base, across, down, picture, row_of_views):  # type: ignore[no-untyped-def]
-    """Where the first of the samples around a ray stands in each of the four views that it lies between.
+    """Where the first of the samples around a ray begins in each of the four views around it.
 
     Args:
         base: where the first view begins.
-        across: where its column begins in a row of samples, in the left views and in the right ones.
-        down: where its row begins, in the upper views and in the lower ones.
+        across: offset of its column in a row of samples, in the left views and in the right ones.
+        down: offset of its row, in the upper views and in the lower ones.
         picture: values from a view to the next one in its row.
         row_of_views: values from a row of views to the next.
     """
@@ -92,13 +92,13 @@ def corners_in_four_views(base, across, down, picture, row_of_views):  # type: i
 
 @_inlined
 def weights_in_four_views(weight, fi, fj, parts):  # type: ignore[no-untyped-def]
-    """What two rows and two columns of samples in each of four views count for a ray, where its axes part.
+    """Weights of two rows and two columns of samples in each of four views, if the axes are separable.
 
     Args:
         weight: of the ray.
-        fi: how near it is to the right views, 0 to 1.
-        fj: to the lower ones.
-        parts: of a sample by which it lies beyond the first: columns (left views, right), rows (upper, lower).
+        fi: fraction of the way to the right views, 0 to 1.
+        fj: fraction of the way to the lower views.
+        parts: fractions of a sample beyond the first: columns (left views, right), rows (upper, lower).
 
     Returns:
         Rows (two of the upper views, two of the lower) and columns (two of the left, two of the right), float32.
@@ -165,16 +165,16 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 @_inlined
 def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
-    """Look a packet of n rays up in the light field and add what they carry to sums (half, `LANES` or channels).
+    """Look up a packet of n rays in the light field and add the results to sums (half, `LANES` or channels).
 
-    Rays from ``second`` on belong to the second half. Places are replaced by indices.
+    Rays from ``second`` on belong to the second half. Positions are replaced by indices.
     """
     samples, _, index_from_ray, motion, between = field
     values, (nv, nu, high, wide), channels = samples
     first_rows, first_columns, nt, ns = begin
     x, y, s, t, share = rays
     to_indices(index_from_ray, rays, n)
-    # Where x and y do not mix, the pixels looked at in four views are two columns and two rows.
+    # If x and y are separable, the pixels read in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)
     line, picture, row_of_views = wide * channels, high * wide * channels, nu * high * wide * channels
@@ -188,7 +188,7 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
         i, j, k, l = x[p], y[p], s[p], t[p]
         if not may_find_light(i, j, k, l, views, dark):
             continue
-        i0, j0, fi, fj = views_of_ray(i, j, nu, nv, between)  # without motion where they are not interpolated
+        i0, j0, fi, fj = views_of_ray(i, j, nu, nv, between)  # motion is zero if views are not interpolated
         if vectors:
             k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
             k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
@@ -225,12 +225,12 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
                 add_view(samples, base, view_k, view_l, np.float32(w), sums[half])
 
 
-# --- and back ---
+# --- backward ---
 
 
 @_compiled
 def spread_view(grown, base, k, l, weight, weights, pixel):  # type: ignore[no-untyped-def]
-    """Add to a view's samples around (k, l) what they add to a pixel; the transpose of `add_view`."""
+    """Add a pixel's gradient to a view's samples around (k, l); the transpose of `add_view`."""
     values, (_, _, rows, columns), channels, _, _ = grown
     k0, l0 = math.floor(k), math.floor(l)
     fk, fl = k - k0, l - l0
@@ -246,7 +246,7 @@ def spread_view(grown, base, k, l, weight, weights, pixel):  # type: ignore[no-u
 
 @_back
 def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type: ignore[no-untyped-def]
-    """Fill cotangents ``bar`` (5, rays) of indices and shares of rays, by what they find in the light field."""
+    """Fill ``bar`` (5, rays), the cotangents of indices and shares of rays, from the light field."""
     (values, views, channels), _, _, motion, between = field
     nv, nu, nt, ns = views
     line, picture = ns * channels, nt * ns * channels
@@ -303,7 +303,7 @@ def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type
                 t01 += share * to_k * away_j
                 t10 += share * to_l * away_i
                 t11 += share * to_l * away_j
-        # Beyond the outermost views, and where there is one, weights are even.
+        # Weights are constant beyond the outermost views and along an axis with one view.
         of_i = of_i if along_i == 2 and i >= 0.0 and i <= nu - 1.0 else 0.0
         of_j = of_j if along_j == 2 and j >= 0.0 and j <= nv - 1.0 else 0.0
         if between:

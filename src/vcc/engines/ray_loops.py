@@ -1,14 +1,15 @@
 """The compiled loops over pixels, packets and tiles that trace rays; see `vcc.engines.ray_tables`.
 
-One loop serves every camera: what a ray meets comes as a list of numbers, `vcc.engines.ray_steps`. A packet holds
-the rays of one pixel. Its stages are functions of their own, compiled once for all loops and all types of samples:
-inlined in each, they took three times as long to compile.
+One loop serves every camera: the steps of a ray are a list of numbers, `vcc.engines.ray_steps`. A packet holds
+the rays of one pixel. Its stages are separate functions, compiled once for all loops and all types of samples:
+inlined in each loop, they took three times as long to compile.
 
-`add_pixels` adds up what the rays of each pixel find. Back to samples, rays of neighbouring pixels meet the same
-ones: so they are first traced and put in the order of the views that they meet (`find_tile`), and then each row of
-views is handed what is its own, by one thread (`spread_row`): nobody waits for another, the samples of a view that
-are in use stay in the first-level cache, and every sum is taken in one order. Back to numbers, what the rays of a
-packet were before each step is kept, and they go back along their way (`numbers_of_tiles`).
+`add_pixels` sums the samples that the rays of each pixel read. The transpose to samples has two stages, because
+rays of neighbouring pixels read the same samples. `find_tile` traces the rays and sorts them by the view that
+they read; then one thread per row of views adds the gradients of this row (`spread_row`). Threads do not wait
+for each other, the samples of a view stay in the first-level cache, and every sum has a fixed order. For
+gradients to parameters, the state of a packet before each step is stored, and `gradients_of_tiles` goes backward
+through the steps.
 """
 
 from __future__ import annotations
@@ -49,42 +50,42 @@ from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spre
 from vcc.plan.rays.points import DIGITS
 
 PACKET = 256
-"""Rays at a time: six numbers each, which stay in the first-level cache."""
+"""Rays of a packet: their six numbers each stay in the first-level cache."""
 
 _compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
 _allocating = compiled(fastmath={"contract", "nsz"})
 _back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they run on several rays at once."""
+"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 _inlined_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
 _allocating_back = compiled(fastmath={"contract", "nsz", "reassoc"})
 
 
 @_allocating
 def working_arrays():  # type: ignore[no-untyped-def]
-    """Where rays are traced: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
+    """Buffers for tracing: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
     rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
     return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
 
 
 @_compiled
 def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
-    """The pixels of a tile, into pictures (2, rows, columns, channels); what is given: `vcc.engines.ray_tables`.
+    """Trace the pixels of a tile into pictures (2, rows, columns, channels); arguments: `vcc.engines.ray_tables`.
 
-    The first picture is what all of a pixel's rays find, the second what its two halves differ by. Once
-    ``ended[0]`` is true, nobody wants them, and the kernel returns. It is called from Python as it is:
-    a kernel around it that made the arrays took a third of the time to compile.
+    The first picture is the sum over all rays of a pixel, the second the difference of the two halves. The
+    kernel returns once ``ended[0]`` is true (cancelled). Python calls it directly: a wrapper kernel that
+    allocated the arrays took a third of the compile time.
 
     Args:
-        field: of whole views or of parts of them.
-        begin: where these parts begin.
-        window: where to aim, or None where there are cells: what is None is not compiled.
-        cells: through which to aim, or None.
-        steps: what rays meet.
-        few: True where all steps are among `FEW`, else None.
-        rare: the other way round.
+        field: whole views, or parts of them.
+        begin: where the parts begin.
+        window: where to aim, or None if there are cells. Branches on None are not compiled.
+        cells: the cells to aim through, or None.
+        steps: the steps of the rays.
+        few: True if all steps are in `FEW`, else None.
+        rare: None if all steps are in `FEW`, else True.
         within: as returned by `working_arrays`.
-        sums: of a packet, float32, and of a pixel, (2, lanes) each; and how many rays were traced, (1,).
+        sums: of a packet, float32, and of a pixel, (2, lanes) each; and the number of traced rays, (1,).
     """
     table, samples, _, seed = points
     channels = field.samples.channels
@@ -126,11 +127,11 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
                     if rare is not None:
                         take_steps(steps, drawn, rays)
                     add_rays(field, begin, rays, n, samples // 2 - done, sums)
-                    for half in range(2):  # a packet in single precision, the packets in double
+                    for half in range(2):  # single precision within a packet, double across packets
                         for lane in range(sums.shape[1]):
                             totals[half, lane] += sums[half, lane]
                             sums[half, lane] = 0
-            # Where vectors left them apart, the right pixels' channels are added to the left ones'.
+            # Vector code keeps left and right pixels of the samples in separate lanes: add them.
             apart = channels == 1 or channels == 3 or channels == 4
             for channel in range(channels):
                 one, two = totals[0, channel], totals[1, channel]
@@ -146,9 +147,9 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
 
 @_inlined
 def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-def]
-    """Keep where those of n rays that meet the light field do; returns how many are kept now.
+    """Store the places of those of n rays that reach the light field; return how many places are stored now.
 
-    Which do is said by `ray_lookup.add_rays`. Places are replaced by indices.
+    The same rays as in `ray_lookup.add_rays`. Places in ``rays`` are replaced by indices.
     """
     all_views, index_from_ray, motion, between = look
     nv, nu, _, _ = all_views
@@ -170,7 +171,7 @@ def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-d
 
 @_compiled
 def put_in_order(found, filled):  # type: ignore[no-untyped-def]
-    """Put the places that are kept in the order of their views."""
+    """Sort the stored places by view."""
     places, views, ordered, begin = found
     begin[:] = 0
     for p in range(filled):
@@ -182,25 +183,25 @@ def put_in_order(found, filled):  # type: ignore[no-untyped-def]
         for n in range(6):
             ordered[to, n] = places[p, n]
         begin[view] += 1
-    for view in range(len(begin) - 1, 0, -1):  # each begins where the one before it ended
+    for view in range(len(begin) - 1, 0, -1):  # each view begins where the one before it ends
         begin[view] = begin[view - 1]
     begin[0] = 0
 
 
 @_allocating
 def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
-    """Trace the pixels of a tile from its pixel ``start`` on, as long as there is room to keep what they meet.
+    """Trace the pixels of a tile from its pixel ``start`` on, until the buffers for their places are full.
 
     Returns:
-        The number, in the tile, of the first pixel that was not traced: as many as there are once all were. After
-        ``ended[0]`` is true it means nothing.
+        The number, in the tile, of the first pixel that was not traced; the number of pixels if all were.
+        Undefined once ``ended[0]`` is true.
     """
     return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, working_arrays())
 
 
 @_compiled
 def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
-    """As `find_tile`, within `working_arrays`."""
+    """As `find_tile`, with buffers from `working_arrays`."""
     table, samples, _, seed = points
     cells = aim.cells
     rays, near, images, flipped = within
@@ -235,16 +236,16 @@ def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, wit
 
 @_compiled
 def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-def]
-    """Hand to samples what the rays carry whose first view is in a row of views.
+    """Add the gradients of the rays whose first view is in a row of views to the samples.
 
-    That are samples of this row of views and, where rays lie between views, of the next one.
+    These are samples of this row of views and, for rays between views, of the next row.
 
     Args:
         grown: `vcc.engines.ray_tables.Grown`.
         weights: of the pixels' values, flat, float32.
-        ordered: (tiles, rays, 6), what was found in some tiles, whose order is that of sums.
-        begin: (tiles, views + 1), where each view's begin; see `vcc.engines.ray_tables.Found`.
-        row: of views.
+        ordered: (tiles, rays, 6), the sorted places of some tiles; sums follow the order of tiles.
+        begin: (tiles, views + 1), where each view begins; see `vcc.engines.ray_tables.Found`.
+        row: the row of views.
     """
     values, (nv, nu, nt, ns), channels, motion, between = grown
     # As in `ray_lookup.add_rays`.
@@ -306,7 +307,7 @@ def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-
 
 @_inlined_back
 def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
-    """Set ``lit`` to 1 for rays that carry light, else to 0; returns how many do."""
+    """Set ``lit`` to 1 for rays that carry light, else to 0; return how many do."""
     number = 0
     for p in range(n):
         carries = share[p] > 0.0
@@ -317,10 +318,11 @@ def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
 
 @_inlined_back
 def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gradients):  # type: ignore[no-untyped-def]
-    """Trace a packet of rays, which ``ways[0][0]`` holds at the sensor, and go back with what they find.
+    """Trace a packet of rays from the sensor (``ways[0][0]``), and go backward with the samples that they read.
 
-    ``ways``: (what rays are before each step and behind all, and their indices (steps + 2, 5, rays); which are not
-    stopped; cotangents (5, rays); room for two numbers a ray, and for the sums of `cell_back`).
+    ``ways``: (state of the rays before each step, behind the last one, and as indices, (steps + 2, 5, rays); 1
+    for rays that are not stopped; cotangents (5, rays); a buffer of two numbers per ray; a buffer for
+    `cell_back`).
     """
     kept, lit, bar, found, sums = ways
     n, number = drawn.rays, len(steps.codes)
@@ -348,10 +350,10 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gr
 
 @_allocating_back
 def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradients, tiles):  # type: ignore[no-untyped-def]
-    """Add the pixels' gradients of some tiles to ``gradients``; what is given: `vcc.engines.ray_tables`.
+    """Add the gradients of the pixels of some tiles to ``gradients``; arguments: `vcc.engines.ray_tables`.
 
-    ``weights``: (rows, columns, channels), of the picture. ``tiles``: (tiles, 4). Once ``ended[0]`` is true,
-    nobody wants them, and the kernel returns.
+    ``weights``: of the image, (rows, columns, channels). ``tiles``: (tiles, 4). The kernel returns once
+    ``ended[0]`` is true (cancelled).
     """
     kept = np.empty((len(steps.codes) + 2, 5, PACKET))
     ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
@@ -360,7 +362,7 @@ def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradie
 
 @_back
 def gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
-    """As `gradients_of_tiles`, within `working_arrays`, and the ways of `packet_back`."""
+    """As `gradients_of_tiles`, with buffers from `working_arrays` and for `packet_back`."""
     table, samples, _, seed = points
     cells = aim.cells
     _, near, images, flipped = within

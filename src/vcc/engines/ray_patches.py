@@ -1,9 +1,9 @@
-"""Which parts of the views the rays of some pixels look at, where all that they meet is affine.
+"""The parts of the views that rays of a tile of pixels read, if all steps of the rays are affine.
 
-A plain lens sends the rays of each pixel to all views, but in each of them to a few samples only, which
-neighbouring pixels share. Looked up in the views as they lie in memory, almost every ray waits for a line of
-memory of its own. Here what a tile of pixels looks at is copied next to one another, where it stays in the cache,
-and is filtered on its way there: no filtered copy of the light field is made.
+A plain lens sends the rays of each pixel to all views, but to a few samples in each view, which neighbouring
+pixels share. If rays read the views in place, almost every ray waits for its own cache line. Instead, the parts
+that a tile of pixels reads are copied next to each other, where they stay in the cache. They are filtered while
+they are copied: no filtered copy of the light field is made.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from vcc.plan.rays.model import Rays
 from vcc.plan.rays.reach import Reach
 
 TILES = 64, 48, 32, 24, 16, 8
-"""Pixels a side of the tiles that are tried."""
+"""Sides, in pixels, of the tiles that are tried."""
 CACHE = 2**22
-"""Bytes of what a tile looks at, at most: as much as caches hold for each thread."""
+"""Largest size, in bytes, of the parts that a tile reads: the cache of one thread."""
 MOST = 3
-"""How many times each sample is filtered, at most, where tiles look at the same ones."""
+"""Largest number of times that each sample is filtered because several tiles read it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Patches(Brief):
-    """What tiles of pixels look at.
+    """The parts of views that tiles of pixels read.
 
     Args:
-        tile: pixels a side.
-        rows: (tiles down, v), the first row that a row of tiles looks at in each row of views.
-        columns: (tiles across, u), likewise the first column.
+        tile: side of a tile in pixels.
+        rows: (tiles down, v), the first row that a row of tiles reads in each row of views.
+        columns: (tiles across, u), the first column that a column of tiles reads in each column of views.
         size: rows and columns of each part.
     """
 
@@ -43,11 +43,11 @@ class Patches(Brief):
 
 
 def patches_of(core: Rays, sample_bytes: int) -> Patches | None:
-    """The parts of views that tiles of pixels look at; None where that is not known, or not worth it.
+    """The parts of views that tiles of pixels read; None if they are unknown or copying them does not pay.
 
     Args:
-        core: what is traced.
-        sample_bytes: of a sample, all channels.
+        core: the rays to trace.
+        sample_bytes: bytes of a sample, all channels.
     """
     reach, (nv, nu, nt, ns) = core.reach, core.views
     if reach is None or not core.between_views:
@@ -64,13 +64,13 @@ def patches_of(core: Rays, sample_bytes: int) -> Patches | None:
 
 
 def rows_that_look(core: Rays, tile: int) -> list[int]:
-    """The first rows of the rows of tiles from which rays may look at any row of the views' pixels.
+    """The first rows of the rows of tiles from which rays may reach any row of the views' pixels.
 
-    A band of a light field that is read in parts is looked at from a part of the sensor.
+    If a band of a light field is read from disk, only a part of the sensor sees it.
 
     Args:
-        core: what is traced.
-        tile: pixels a side.
+        core: the rays to trace.
+        tile: side of a tile in pixels.
     """
     first = np.arange(0, core.raster_shape[0], tile)
     if core.reach is not None:
@@ -83,7 +83,7 @@ def rows_that_look(core: Rays, tile: int) -> list[int]:
 
 
 def _along(reach: Reach, axis: int, tile: int, shape: tuple[int, ...]) -> tuple[NDArray[np.int64], int] | None:
-    """The first pixel along an axis that each tile looks at in each view, (tiles, views); how many it looks at."""
+    """The first pixel along an axis that each tile reads in each view, (tiles, views), and their number."""
     pixels, sensor = shape[3 - axis], reach.raster_shape[1 - axis]
     first = np.arange(0, sensor, tile)
     found = reach.samples(axis, first, np.minimum(first + tile, sensor) - 1, shape[1 - axis])

@@ -1,10 +1,11 @@
-"""What a packet of rays meets on its way from the sensor to the light field, step by step, and the way back.
+"""The steps of a packet of rays from the sensor to the light field, and their derivatives.
 
-A step is a code and some numbers (`vcc.plan.rays.steps`); they are read once for a packet, so that reading them
-costs nothing and the arithmetic runs on several rays at once. `take_steps` takes a packet through them.
-`step_back` goes back through one: from what a sum says of the rays behind it to what it says of those before it,
-and of the step's numbers; `vcc.plan.rays.backwards` explains these derivatives. Rays that a hard edge stops say
-nothing; those that a mask weighs with zero do. What a step does and its derivative are to be changed together.
+A step is a code and some numbers (`vcc.plan.rays.steps`). They are read once per packet, so that reading them
+costs nothing and the arithmetic vectorises over rays. `take_steps` takes a packet through all steps. `step_back`
+goes backward through one step: from the cotangents of the rays behind the step to those of the rays before it
+and to the gradients of the step's parameters; `vcc.plan.rays.backwards` explains these derivatives. Rays that a
+hard edge stops contribute nothing; rays that a mask weighs with zero contribute. Change a step and its
+derivative together.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from vcc.engines.ray_tables import Packet, Steps
 
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
 _inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Of what compiled code alone calls: no way for Python to call it is compiled."""
+"""Called by compiled code only: no wrapper for Python is compiled."""
 _back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they run on several rays at once."""
+"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 _inlined_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
 
 
 @_inner
 def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
-    """(row, column, centre x, centre y) of the cell that holds a place; turn as `steps._lattice_numbers`."""
+    """(row, column, centre x, centre y) of the cell around a place; ``turn`` as in `steps._lattice_numbers`."""
     cosine, sine, offset_x, offset_y, pitch, height = turn[0], turn[1], turn[2], turn[3], turn[4], turn[5]
     dx, dy = x - offset_x, y - offset_y
     across = (cosine * dx + sine * dy) * (1 / pitch)
@@ -67,7 +68,7 @@ def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
 
 @_inner
 def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
-    """(columns, row, next row, column, next column, way down, way to the right) of a place on a texture."""
+    """(columns, row, next row, column, next column, fraction down, fraction right) of a place on a texture."""
     c, c1, right = around((x - real[0]) * real[2], columns)
     r, r1, down = around((y - real[1]) * real[3], rows)
     return columns, r, r1, c, c1, down, right
@@ -75,7 +76,7 @@ def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
 
 @_inner
 def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
-    """One of ``width`` numbers of the texture that begins at ``start``, at a place that `corner` found."""
+    """One of ``width`` values per point of the texture at ``start``, interpolated at a place from `corner`."""
     columns, r, r1, c, c1, down, right = at
     above, below, start = r * columns, r1 * columns, start + number
     return bilinear(
@@ -90,7 +91,7 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
 
 @_inlined
 def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
-    """Step 0: an affine map along x, and one along y."""
+    """Step 0: an affine map along x and another along y."""
     f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
     for p in range(n):
         xp, sp = x[p], s[p]
@@ -121,12 +122,12 @@ def within_rectangle(f, n, x, y, share):  # type: ignore[no-untyped-def]
 
 
 FEW = frozenset({0, 6, 7})
-"""Codes of the steps of a plain lens: affine along x and y apart, a round rim, a rectangular one."""
+"""Codes of the steps of a plain lens: affine maps along x and y, a round aperture, a rectangular one."""
 
 
 @_inner
 def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
-    """As `take_steps`, where all steps are among `FEW`, which take a tenth of the time to compile."""
+    """As `take_steps` if all steps are in `FEW`; compiling these takes a tenth of the time."""
     codes, _, real, _, _ = steps
     n = drawn.rays
     x, y, s, t, share = rays
@@ -144,7 +145,7 @@ def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
-    Numbers of a step are read before its loop, so that loops without branches run on several rays at once.
+    The numbers of a step are read before its loop: loops without branches vectorise over rays.
     """
     codes, whole, real, shares, slopes = steps
     points, first, n, _ = drawn
@@ -161,7 +162,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 s[p] = f[10] * xp + f[11] * yp + f[12] * sp + f[13] * tp + f[14]
                 t[p] = f[15] * xp + f[16] * yp + f[17] * sp + f[18] * tp + f[19]
         elif code == 2 and a[0] == 0 and a[1] * a[2] == 1:
-            # The usual array, square and all alike: no branches.
+            # The usual array: square cells, all equal, no branches.
             power, slope_x, slope_y = slopes[a[3]], slopes[a[3] + 1], slopes[a[3] + 2]
             cosine, sine, offset_x, offset_y, pitch = f[0], f[1], f[2], f[3], f[4]
             per_pitch = 1 / pitch
@@ -255,7 +256,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
 
 @_inlined_back
 def packet_of(numbers):  # type: ignore[no-untyped-def]
-    """Rays by name, of numbers (5, rays)."""
+    """A packet of rays from an array (5, rays)."""
     return Packet(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
 
 
@@ -267,7 +268,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
     for q in range(5):
         for p in range(n):
             behind[q, p] = before[q, p]
-    # Told apart from a share of zero by a share of one.
+    # The step runs on shares of one: a share that becomes zero there was stopped, not zero before.
     hole = code == 3 or code == 11 or code == 6 or code == 7
     if hole:
         for p in range(n):
@@ -286,7 +287,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
 
 @_back
 def moved_back(m, n, before, bar, own):  # type: ignore[no-untyped-def]
-    """Cotangents of places and slopes back through an affine map, 4×5; of its own they are added to ``own``."""
+    """Take cotangents of places and slopes back through the 4×5 map ``m``; add the map's gradients to ``own``."""
     for q in range(4):
         s0 = s1 = s2 = s3 = s4 = 0.0
         for p in range(n):
@@ -312,16 +313,16 @@ def moved_back(m, n, before, bar, own):  # type: ignore[no-untyped-def]
 
 @_back
 def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no-untyped-def]
-    """What numbers that a packet looks up in a texture say of its places, and, added up, of the texture.
+    """Backward of a texture lookup: add gradients to the places of a packet and to the texture.
 
     Args:
         table: of all textures.
-        sizes: (rays, rows, columns, start in the table, numbers a point).
+        sizes: (rays, rows, columns, start in the table, values per point).
         real: see `vcc.plan.rays.steps.Texture.real`.
-        rays: (x, y, cotangents of x, of y), to the latter of which is added.
-        values: cotangents of the numbers found, (numbers a point or fewer, rays).
-        out: like the table, or empty.
-        own: four sums: of start and spacing, but for factors.
+        rays: (x, y, cotangents of x, of y); the cotangents are added to.
+        values: cotangents of the looked-up values, (values per point or fewer, rays).
+        out: gradients of the texture, shaped like the table; empty if they are not wanted.
+        own: four sums for the gradients of the texture's start and spacing, up to factors.
     """
     n, rows, columns, start, width = sizes
     x, y, gx, gy = rays
@@ -344,7 +345,7 @@ def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no
                 out[p01 + number] += value * (1.0 - down) * right
                 out[p10 + number] += value * down * (1.0 - right)
                 out[p11 + number] += value * down * right
-        # Beyond its ends a texture is even.
+        # A texture is constant beyond its ends.
         to_x = to_x * real[2] if across >= 0.0 and across <= columns - 1.0 else 0.0
         to_y = to_y * real[3] if below >= 0.0 and below <= rows - 1.0 else 0.0
         gx[p] += to_x
@@ -361,10 +362,10 @@ def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no
 
 @_back
 def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[no-untyped-def]
-    """Cotangents ``bar`` (5, rays) of a packet behind a step become those before it.
+    """Turn the cotangents ``bar`` (5, rays) of a packet behind a step into those before it, in place.
 
-    ``sums``: (steps, matrices, shares, slopes, points) of `vcc.engines.ray_tables.RayGradients`; gradients of the
-    step's parameters are added to them. ``found``: a buffer of two numbers per ray.
+    ``sums``: (steps, matrices, shares, slopes, points) of `vcc.engines.ray_tables.RayGradients`; gradients of
+    the step's parameters are added to them. ``found``: a buffer of two numbers per ray.
     """
     codes, whole, real, shares, slopes = steps
     points, first, n, _ = drawn
@@ -416,7 +417,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             c, r = int(min(max(column, 0), a[1] - 1)), int(min(max(row, 0), a[0] - 1))
             at = a[2] + r * a[1] + c
             if len(out_shares) > 0:
-                out_shares[at] += gw[p] * share[p]  # of rays beside all cells gw is 0
+                out_shares[at] += gw[p] * share[p]  # gw is 0 for rays outside all cells
             gw[p] *= shares[at]
     elif code == 9:
         for p in range(n):
@@ -457,7 +458,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
 
 @_back
 def cosines(frequency, middle, phase, harmonics, place):  # type: ignore[no-untyped-def]
-    """(½ + Σ cos(nθ)/2h, its derivative to θ) of a mask of cosines along one axis; (1, 0) along one without."""
+    """(½ + Σ cos(nθ)/2h, its derivative to θ) of a cosine mask along one axis; (1, 0) if it is constant."""
     if not frequency > 0.0:
         return 1.0, 0.0
     angle = frequency * (place - middle) + phase

@@ -1,6 +1,6 @@
-"""What the compiled kernel of rays is given: numbers and arrays under names, as Numba takes them.
+"""Arguments of the compiled kernel of rays: named tuples of numbers and arrays, as Numba accepts them.
 
-`vcc.engines.rays_compiled` fills these from a plan, `vcc.engines.ray_loops` reads them. All arrays are
+`vcc.engines.rays_compiled` fills them from a plan, `vcc.engines.ray_loops` reads them. All arrays are
 contiguous; pairs are along (x, y).
 """
 
@@ -16,12 +16,12 @@ Pair = tuple[float, float]
 
 
 class Samples(NamedTuple):
-    """The numbers of a light field.
+    """The samples of a light field.
 
     Args:
         values: flat, in the order (v, u, t, s, channel).
         views: (v, u, t, s).
-        channels: numbers a sample.
+        channels: values per sample.
     """
 
     values: NDArray[Any]
@@ -33,8 +33,8 @@ class LightField(NamedTuple):
     """A light field, and how rays look it up.
 
     Args:
-        samples: its numbers.
-        scale: turns them into radiance.
+        samples: its samples.
+        scale: factor from samples to radiance.
         index_from_ray: 4×5, indices (i, j, k, l) from rays (x, y, s, t, 1).
         motion: 2×2; a point of the scene is seen in view (i, j) at pixel (k, l) − motion · (i, j).
         between: whether views are interpolated.
@@ -48,13 +48,13 @@ class LightField(NamedTuple):
 
 
 class Begin(NamedTuple):
-    """Which parts of the views of a light field are there, all of one size.
+    """The parts of the views of a light field that are in memory, all of one size.
 
     Args:
-        rows: (v,), the first row of pixels of the parts of a row of views.
-        columns: (u,), the first column of pixels of the parts of a column of views.
+        rows: (v,), first row of pixels of the parts in each row of views.
+        columns: (u,), first column of pixels of the parts in each column of views.
         high: rows of pixels of a whole view.
-        wide: columns of it.
+        wide: columns of pixels of a whole view.
     """
 
     rows: NDArray[np.int64]
@@ -64,13 +64,13 @@ class Begin(NamedTuple):
 
 
 class Sensor(NamedTuple):
-    """The picture's pixels.
+    """The pixels of the image.
 
     Args:
-        rows: how many.
-        columns: how many.
-        first: place of the middle of pixel (0, 0), metres.
-        pitch: from pixel to pixel, metres.
+        rows: number of rows.
+        columns: number of columns.
+        first: position of the centre of pixel (0, 0), metres.
+        pitch: pixel pitch, metres.
         sensitive: size of a pixel's sensitive area, metres.
     """
 
@@ -82,12 +82,12 @@ class Sensor(NamedTuple):
 
 
 class Points(NamedTuple):
-    """The points that all pixels share, and which of them a pixel takes.
+    """The points that all pixels share, and the choice of a block of them for each pixel.
 
     Args:
         table: (columns, points) float32, see `vcc.plan.rays.model.Rays.points`.
-        samples: rays a pixel, a power of two.
-        beside: which block beside the hashed one is taken.
+        samples: rays per pixel, a power of two.
+        beside: combined with the hashed block number by XOR: 0 for this block, 1 for its neighbour.
         seed: of the hash, 32 bits.
     """
 
@@ -101,12 +101,12 @@ class Window(NamedTuple):
     """Where to aim through affine optics, see `vcc.plan.rays.bounds.windows.Window`.
 
     Args:
-        from_point: 2×2, slopes from the window's point.
-        from_sensor: 2×2, slopes from the place on the sensor, 1/m.
+        from_point: 2×2, slopes from the point in the window.
+        from_sensor: 2×2, slopes from the position on the sensor, 1/m.
         offset: of the slopes.
         solid_angle: ∫∫ ds dt over the window.
-        disc: whether it is a disc.
-        scatter: (diffusers, 5): column of the table, and slopes from what the diffuser there does.
+        disc: whether the window is a disc.
+        scatter: (diffusers, 5): column of the table, and slopes from the deflection by this diffuser.
     """
 
     from_point: Array
@@ -118,26 +118,26 @@ class Window(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Where to aim through the cells of an array, by the names of `vcc.plan.rays.bounds.windows.CellWindows`.
+    """Where to aim through the cells of an array; field names as in `vcc.plan.rays.bounds.windows.CellWindows`.
 
     Args:
         layout: 0 square, 1 hexagonal.
-        turn: (cosine, sine, offset x, offset y, pitch, height of a row) of the lattice.
+        turn: (cosine, sine, offset x, offset y, pitch, row height) of the lattice.
         kinds: (rows, columns, 3): 1/f, δs and δt of the kinds of cells.
-        reach: (rows, columns) of cells on each side of the nearest one that are looked at.
-        borders: (strips, 2): what cuts out a cell's opening.
+        reach: (rows, columns) of cells to test on each side of the nearest one.
+        borders: (strips, 2): strips that bound the opening of a cell.
         opening_radius: metres, or infinite.
         disc: whether the stop is an ellipse.
-        place_from_sensor: see there, as all that follow.
-        place_from_slope: see there.
-        offset: see there.
-        beyond: see there.
-        beyond_from_sensor: see there.
-        beyond_from_slope: see there.
-        beyond_offset: see there.
-        middle: see there.
-        half: see there.
-        cell_half: see there.
+        place_from_sensor: see `CellWindows`, as for all fields below.
+        place_from_slope: see `CellWindows`.
+        offset: see `CellWindows`.
+        beyond: see `CellWindows`.
+        beyond_from_sensor: see `CellWindows`.
+        beyond_from_slope: see `CellWindows`.
+        beyond_offset: see `CellWindows`.
+        middle: see `CellWindows`.
+        half: see `CellWindows`.
+        cell_half: see `CellWindows`.
     """
 
     layout: int
@@ -160,7 +160,7 @@ class Cells(NamedTuple):
 
 
 class Aim(NamedTuple):
-    """Which slopes are traced: through the cells or to the window; of the other the numbers mean nothing."""
+    """Where to aim: through the cells or at the window. The fields of the other one are undefined."""
 
     by_cell: bool
     window: Window
@@ -168,14 +168,14 @@ class Aim(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """What a ray meets, see `vcc.plan.rays.steps.Packer`.
+    """The steps of rays, see `vcc.plan.rays.steps.Packer`.
 
     Args:
-        codes: (steps,) int64, which step it is.
-        whole: (steps, numbers) int64, its whole numbers.
+        codes: (steps,) int64, code of each step.
+        whole: (steps, numbers) int64, its integers.
         real: (steps, numbers), its real numbers.
-        shares: tables of shares, one after another, float32.
-        slopes: tables of slopes, likewise.
+        shares: concatenated tables of shares, float32.
+        slopes: concatenated tables of slopes.
     """
 
     codes: NDArray[np.int64]
@@ -186,7 +186,7 @@ class Steps(NamedTuple):
 
 
 class Tile(NamedTuple):
-    """Pixels that are traced together: from a row and a column to before others, or to the picture's end."""
+    """Pixels traced together: ranges of rows and columns, ends exclusive, cropped to the image."""
 
     first_row: int
     end_row: int
@@ -195,7 +195,7 @@ class Tile(NamedTuple):
 
 
 class Packet(NamedTuple):
-    """Rays that are traced together: places in metres, slopes, and the light that each carries, (rays,) each."""
+    """Rays traced together: positions in metres, slopes, and the light that each ray carries, (rays,) each."""
 
     x: Array
     y: Array
@@ -205,13 +205,13 @@ class Packet(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """The points that the rays of a packet take.
+    """The points of the rays of a packet.
 
     Args:
         table: see `Points`.
-        start: of the packet's first ray in the table.
-        rays: how many there are in the packet.
-        flipped: (4,) int64, binary digits that are flipped in the first columns.
+        start: index in the table of the packet's first ray.
+        rays: number of rays in the packet.
+        flipped: (4,) int64, binary digits to flip in the first four columns.
     """
 
     table: NDArray[np.float32]
@@ -221,26 +221,26 @@ class Drawn(NamedTuple):
 
 
 class RayGradients(NamedTuple):
-    """What the rays of some tiles say of the numbers: sums to which `vcc.engines.ray_loops.numbers_of_tiles` adds.
+    """Gradients of the rays of some tiles to parameters: sums that `ray_loops.gradients_of_tiles` adds to.
 
     Args:
-        scale: (1,), but for the scale itself, as all that follow.
+        scale: (1,), without the factor ``scale`` itself, as for all fields below.
         sensor: (6,): first pixel, pitch, sensitive area, (x, y) each.
-        window: (11,): of s from the window's point (a, b), from the place (x, y), and its offset; of t likewise;
-            of the solid angle.
+        window: (11,): for s the coefficients of the window's point (a, b), of the position (x, y), and the
+            offset; the same for t; the solid angle.
         scatter: (diffusers, 4), see `Window`.
         cells: (24,): along x place_from_sensor, place_from_slope, offset, beyond, beyond_from_sensor,
-            beyond_from_slope, beyond_offset and middle, along y likewise; half (x, y); the opening's half width
-            and radius; of the lattice the pitch (times it), rotation and offset (x, y).
-        kinds: like those of `Cells`.
-        borders: likewise.
+            beyond_from_slope, beyond_offset and middle, along y likewise; half (x, y); half width and radius of
+            the opening; for the lattice the pitch (times the pitch), rotation and offset (x, y).
+        kinds: shaped like `Cells.kinds`.
+        borders: shaped like `Cells.borders`.
         indices: (20,), index_from_ray.
         motion: (4,).
         steps: (steps, 20), see `vcc.engines.ray_gradients`.
-        matrices: (steps, 20): the affine maps of steps that are such; only read.
-        shares: like the tables of `Steps`; empty where nobody wants it.
+        matrices: (steps, 20): the maps of affine steps; read only.
+        shares: shaped like the tables of `Steps`; empty if not requested.
         slopes: likewise.
-        points: like the table of `Points`; likewise.
+        points: shaped like `Points.table`; likewise.
     """
 
     scale: Array
@@ -260,7 +260,7 @@ class RayGradients(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How rays look up a light field, without its numbers; see `LightField`."""
+    """How rays look up a light field, without its samples; see `LightField`."""
 
     views: tuple[int, int, int, int]
     index_from_ray: Array
@@ -269,13 +269,13 @@ class Look(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Where the rays of some pixels meet the light field, as they were traced and in the order of views.
+    """Where the rays of some pixels meet the light field: as traced, and sorted by view.
 
     Args:
-        places: (rays, 6): indices (i, j, k, l), what the ray weighs, the number of its pixel.
-        views: (rays,) int32, the number of the first of the views that each lies between.
-        ordered: as ``places``: those of one view after those of another, in the order of rays otherwise.
-        begin: (views + 1,) int64, where those of each view begin in ``ordered``.
+        places: (rays, 6): indices (i, j, k, l), weight of the ray, number of its pixel.
+        views: (rays,) int32, number of the first of the views around each ray.
+        ordered: ``places`` sorted by view; rays of a view keep their order.
+        begin: (views + 1,) int64, where the rays of each view begin in ``ordered``.
     """
 
     places: Array
@@ -285,12 +285,12 @@ class Found(NamedTuple):
 
 
 class Grown(NamedTuple):
-    """What each sample adds to a weighted sum of a picture, as it grows.
+    """Gradients of a weighted sum of an image to the samples, while they are summed.
 
     Args:
         values: flat, in the order (v, u, t, s, channel), float32 or float64.
         views: (v, u, t, s).
-        channels: numbers a sample.
+        channels: values per sample.
         motion: see `LightField`.
         between: see `LightField`.
     """

@@ -1,8 +1,8 @@
-"""What samples add to weighted sums of a picture by rays: the transpose of `rays_compiled`, on several threads.
+"""The transpose of `rays_compiled`: gradients of a raster by rays to samples, on several threads.
 
-Rays are traced once more and kept, some tiles at a time; then those that meet a row of views are handed to it, in
-the order of tiles. A ray between two rows of views is handed to both by one thread, so every other row has its
-turn at the same time. What is done in which order follows from the picture alone: so do all bytes.
+Rays are traced again and stored, some tiles at a time. Then the rays that meet a row of views are added to it,
+in the order of tiles. One thread adds a ray between two rows of views to both, so threads work on every other
+row at the same time. The order of all sums depends on the raster only, and so do the bytes.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from vcc.engines.rays_compiled import TILE, given
 from vcc.plan.rays.model import Rays
 
 KEPT = 2**19
-"""Rays that are kept at a time: some 50 MiB."""
+"""Number of rays stored at a time: some 50 MiB."""
 TILES = 16
-"""Tiles that are traced at a time."""
+"""Number of tiles traced at a time."""
 IN_DOUBLE = 2**22
-"""Numbers of a light field up to which sums are kept in double precision, which takes 32 MiB: the fewer samples
-there are, the more rays each of them meets."""
+"""Largest number of values of a light field for sums in double precision (32 MiB): the fewer samples there are,
+the more rays meet each of them."""
 
 
 def scattered(
@@ -40,17 +40,17 @@ def scattered(
     threads: int,
     progress: Progress | None = None,
 ) -> NDArray[np.float32]:
-    """What each sample adds to a weighted sum of the raster's values by one round of rays.
+    """The derivative of a weighted sum of the raster's values, from one round of rays, to each sample.
 
-    A weight's products are in single precision, as in `rays_compiled.traced`. Sums are, too, where the light field
-    has more than `IN_DOUBLE` numbers.
+    Products with weights are in single precision, as in `rays_compiled.traced`. Sums are in single precision if
+    the light field has more than `IN_DOUBLE` values.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         shape: of the samples, (v, u, t, s[, channels]).
         raster: the weights, (rows, columns, channels).
-        beside: 0, or 1 for the blocks of points beside those of the first round.
-        threads: how many work at once. The bytes are the same.
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
+        threads: number of threads; the bytes do not depend on it.
         progress: called with (done, total) in pixels.
     """
     weights = np.ascontiguousarray(raster * (core.scale / core.samples), dtype=np.float32).reshape(-1)
@@ -77,9 +77,9 @@ class _Kept:
     """Where rays meet the light field, some tiles at a time.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         beside: see `scattered`.
-        pool: of the threads.
+        pool: the threads.
 
     Attributes:
         ordered: (tiles, rays, 6), see `vcc.engines.ray_tables.Found`.
@@ -95,7 +95,7 @@ class _Kept:
         )
         self._find = partial(kernels.find_tile, look, *given(core, beside), pool.ended)
         self._pool, self._core = pool, core
-        most = core.samples * core.most_cells  # that one pixel may have
+        most = core.samples * core.most_cells  # largest number of rays of one pixel
         tiles = max(min(TILES, KEPT // most), 1)
         room = max(KEPT // tiles, most)
         self.ordered = np.empty((tiles, room, 6))
@@ -103,13 +103,13 @@ class _Kept:
         self._places, self._views = np.empty((tiles, room, 6)), np.empty((tiles, room), dtype=np.int32)
 
     def rounds(self) -> Iterator[int]:
-        """Trace as many pixels as there is room for, time and again; yields how many were in all."""
+        """Trace pixels until the buffers are full, repeatedly; yield the number of pixels traced so far."""
         rows, columns = self._core.raster_shape
         tiles = [
             tables.Tile(r, r + TILE, c, c + TILE) for r in range(0, rows, TILE) for c in range(0, columns, TILE)
         ]
         coming, done = iter(tiles), 0
-        begun: list[tuple[int, tables.Tile]] = []  # tiles, and which of their pixels is next
+        begun: list[tuple[int, tables.Tile]] = []  # (next pixel of the tile, tile)
         while begun := begun + [(0, tile) for tile in islice(coming, len(self.ordered) - len(begun))]:
             reached = list(self._pool.map(self._traced, range(len(begun)), begun))
             self.begin[len(begun) :] = 0

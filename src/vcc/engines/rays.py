@@ -1,6 +1,6 @@
-"""Tracing rays plainly, on arrays of any library, with gradients.
+"""Trace rays plainly, on arrays of any library, with gradients.
 
-The rays are the core's own (`vcc.plan.rays.model.Rays.looked_up`), which defines what is correct.
+`vcc.plan.rays.model.Rays.looked_up` of the core traces them; it defines the correct result.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from vcc.plan.rays.model import Rays
 Array = NDArray[np.float64]
 
 RAYS_AT_ONCE = 2**17
-"""Rays that are traced at once in NumPy: some tens of MiB."""
+"""Number of rays traced at once in NumPy; they need some tens of MiB."""
 
 
 def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progress | None = None) -> Partial:
-    """The raster by one round of rays; places and weights are NumPy numbers, samples arrays of any library.
+    """The raster from one round of rays. Places and weights are NumPy arrays, samples arrays of any library.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         values: samples (v, u, t, s[, channels]).
-        double: whether to sum in double precision whatever the samples' type.
-        beside: 0, or 1 for the blocks of points beside those of the first round.
+        double: sum in double precision whatever the type of the samples.
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
         progress: called with (done, total) in pixels.
     """
     xp = array_namespace(values)
@@ -59,10 +59,10 @@ def traced(core: Rays, values: Any, double: bool, beside: int, progress: Progres
 def scattered(
     core: Rays, shape: tuple[int, ...], raster: NDArray[Any], beside: int, progress: Progress | None = None
 ) -> Array:
-    """What each sample adds to a weighted sum of `traced`'s values: its transpose, in double precision.
+    """The transpose of `traced`: the derivative of a weighted raster to each sample, in double precision.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         shape: of the samples, (v, u, t, s[, channels]).
         raster: the weights, (rows, columns, channels).
         beside: as for `traced`.
@@ -84,15 +84,15 @@ def scattered(
 
 
 def memory_of_rays(core: Rays) -> int:
-    """Bytes that tracing plainly takes beside the samples and the raster, estimated."""
+    """Estimated bytes that plain tracing needs besides the samples and the raster."""
     rays = min(RAYS_AT_ONCE, core.rays)
     return int(
         core.points.nbytes + core.tables_bytes + 8 * 40 * rays
-    )  # places, slopes, indices, what is looked up
+    )  # places, slopes, indices, looked-up samples
 
 
 def pieces(core: Rays, rays: int) -> Iterator[NDArray[np.int64]]:
-    """Numbers of pixels, as many at a time as have about so many rays."""
+    """Yield the numbers of consecutive pixels, in groups of about ``rays`` rays."""
     at_once = max(rays // (core.samples * core.most_cells), 1)
     total = core.raster_shape[0] * core.raster_shape[1]
     for first in range(0, total, at_once):
@@ -100,7 +100,7 @@ def pieces(core: Rays, rays: int) -> Iterator[NDArray[np.int64]]:
 
 
 def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, working: Any) -> Any:
-    """What rays find in the light field, interpolated in all four dimensions, times their shares."""
+    """Samples interpolated in four dimensions at the places of rays, times the rays' shares."""
     total = None
     for at, weight in _looked_at(core, index, share):
         where = xp.asarray(at.reshape(-1), device=device(samples))
@@ -111,7 +111,7 @@ def _found(core: Rays, xp: Any, samples: Any, index: Array, share: Array, workin
 
 
 def _looked_at(core: Rays, index: Array, share: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
-    """The samples between which each ray falls, by their numbers, and what each of them adds to what it finds."""
+    """The samples around each ray: their numbers in memory, and the weight of each in the interpolated value."""
     for view in views_around(core, index):
         for at, inside, (across, down), _ in samples_around(core, view):
             yield at, share * (view.near[0] * view.near[1]) * across * down * inside
@@ -119,14 +119,14 @@ def _looked_at(core: Rays, index: Array, share: Array) -> Iterator[tuple[NDArray
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewAround(Brief):
-    """One of the views between which rays fall.
+    """One of the views next to which rays fall.
 
     Args:
-        number: of the view, in the order of memory.
+        number: number of the view in memory order.
         near: its weight along (i, j).
-        steep: the derivatives of these weights.
-        away: (2, …), how far rays fall from it, in views (i, j).
-        place: (2, …), where they fall on its pixels (k, l), followed along the parallax.
+        steep: derivatives of these weights.
+        away: (2, …), distance of the rays from the view, in views (i, j).
+        place: (2, …), position of the rays on its pixels (k, l), with parallax.
     """
 
     number: NDArray[np.int64]
@@ -137,10 +137,10 @@ class ViewAround(Brief):
 
 
 def views_around(core: Rays, index: Array) -> Iterator[ViewAround]:
-    """The views between which rays fall, or the nearest one where they are not interpolated.
+    """The views around each ray, or the nearest view if views are not interpolated.
 
     Args:
-        core: by which they are looked at.
+        core: the rays.
         index: places in the light field, (…, 4).
     """
     nv, nu = core.views[:2]
@@ -155,7 +155,7 @@ def views_around(core: Rays, index: Array) -> Iterator[ViewAround]:
 
 
 def _along(at: Array, number: int, between: bool) -> list[tuple[NDArray[np.int64], Array, Array]]:
-    """The views that rays lie between along one axis: (which, weight, derivative of the weight)."""
+    """The views around rays along one axis: (number, weight, derivative of the weight)."""
     held = np.clip(at, 0, number - 1)
     if not between or number == 1:
         return [((held + 0.5).astype(np.int64), np.ones_like(at), np.zeros_like(at))]
@@ -170,11 +170,11 @@ Weights = tuple[Array, Array]
 def samples_around(
     core: Rays, view: ViewAround
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.bool_], Weights, tuple[int, int]]]:
-    """The four samples of a view between which rays fall, dark outside.
+    """The four samples of a view around each ray; samples outside the view are dark.
 
     Yields:
-        The sample's number, in the order of memory; whether it is one of the view's; its weights (across, down);
-        and the signs of their derivatives.
+        The sample's number in memory order; whether it is inside the view; its weights (across, down); and the
+        signs of their derivatives.
     """
     _, _, nt, ns = core.views
     first = np.floor(view.place).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Tracing rays by the compiled kernel, on several threads."""
+"""Trace rays with the compiled kernel, on several threads."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
 from vcc.plan.rays.model import Rays
 
 TILE = 32
-"""Pixels a side that a thread works on at once: what they look up in the light field stays in its cache."""
+"""Side, in pixels, of the tile that a thread works on: the samples that the tile reads stay in the cache."""
 
 _NOWHERE = (0.0, 0.0)
 NO_WINDOW = tables.Window(np.zeros((2, 2)), np.zeros((2, 2)), _NOWHERE, 0.0, False, np.zeros((0, 5)))
@@ -40,13 +40,13 @@ def traced(
     threads: int,
     progress: Progress | None = None,
 ) -> Partial:
-    """The raster by one round of rays.
+    """The raster from one round of rays.
 
     Args:
-        core: what is traced.
-        values: samples (v, u, t, s[, channels]), or such that are to be sharpened first.
-        beside: 0, or 1 for the blocks of points beside those of the first round.
-        threads: how many work at once. The picture is the same.
+        core: the rays to trace.
+        values: samples (v, u, t, s[, channels]), or samples to sharpen first.
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
+        threads: number of threads; the raster does not depend on it.
         progress: called with (done, total) in tiles.
     """
     patches = parts = None
@@ -63,10 +63,10 @@ def traced(
     lit = rows_that_look(core, tile)
     tiles = [tables.Tile(r, r + tile, c, c + tile) for r in lit for c in range(0, columns, tile)]
     dark = rows - sum(min(tile, rows - r) for r in lit)
-    rays = dark * columns * core.samples  # towards a window all are traced, whatever they look at
+    rays = dark * columns * core.samples  # rays of skipped rows count as traced, as all rays towards a window do
     with Workers(threads) as pool:
         sensor, points, aim, steps = given(core, beside)
-        # Numba leaves out branches by what is None.
+        # Numba removes branches on arguments that are None.
         window, cells = (None, aim.cells) if aim.by_cell else (aim.window, None)
         few, rare = (True, None) if FEW.issuperset(steps.codes.tolist()) else (None, True)
         rest = sensor, points, window, cells, steps, few, rare, pool.ended, pictures
@@ -87,7 +87,7 @@ def traced(
 def _tile_of_parts(
     core: Rays, parts: Parts, patches: Patches, rest: tuple[Any, ...], own: local, tile: tables.Tile
 ) -> int:
-    """As `_tile`, of the parts of views that the tile looks at; each thread has its own room for them."""
+    """As `_tile`, on the parts of views that the tile reads; each thread has its own buffers for them."""
     if not hasattr(own, "room"):
         own.room = parts.buffers()
         views = (*core.views[:2], *parts.size)
@@ -99,7 +99,7 @@ def _tile_of_parts(
 
 
 def _tile(*given: Any) -> int:
-    """The pixels of a tile, by `kernels.add_pixels`, in arrays of its own; returns how many rays were traced."""
+    """Trace the pixels of a tile with `kernels.add_pixels`, in new buffers; return the number of traced rays."""
     lanes = max(given[0].samples.channels, LANES)
     sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, dtype=np.int64)
     near, images, flipped = np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
@@ -109,7 +109,7 @@ def _tile(*given: Any) -> int:
 
 
 def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables.Aim, tables.Steps]:
-    """What kernels that trace rays are given of a core."""
+    """The arguments of a core for kernels that trace rays."""
     return _sensor(core), _points(core, beside), _aim(core.aim), _steps(core)
 
 
@@ -120,7 +120,7 @@ def light_field(core: Rays, values: NDArray[Any], channels: int) -> tables.Light
 
 
 def looked_up_as(core: Rays, values: Any, channels: int) -> tables.LightField:
-    """The same for samples that lie flat, in the order (v, u, t, s, channel), wherever they are."""
+    """As `light_field`, from flat samples in the order (v, u, t, s, channel), in main or GPU memory."""
     return tables.LightField(
         tables.Samples(values, core.views, channels),
         core.scale,
@@ -135,7 +135,7 @@ def _sensor(core: Rays) -> tables.Sensor:
 
 
 def _points(core: Rays, beside: int) -> tables.Points:
-    seed = core.seed & 0xFFFFFFFF  # the hash takes no more of it
+    seed = core.seed & 0xFFFFFFFF  # the hash uses 32 bits of it
     return tables.Points(np.ascontiguousarray(core.points.T, dtype=np.float32), core.samples, beside, seed)
 
 

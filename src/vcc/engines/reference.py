@@ -1,9 +1,9 @@
-"""The reference engine: the sum of the plan written out plainly, in float64. It defines what is correct.
+"""The reference engine: the sum of the plan, written out plainly in float64. It defines the correct result.
 
     I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q))
 
-The one subtlety: where the frame shears the pixel grid, a sample's column on the sensor is taken at the row
-that is looked at, x(q) + shear · (y − y(q)), so that the shares still sum to one both ways.
+If the frame shears the pixel grid, a sample's column on the sensor depends on the pixel row y: it is
+x(q) + shear · (y − y(q)). The shares of a sample then still sum to one along both axes.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ def back(
     threads: int,
     progress: Progress | None = None,
 ) -> Gradient:
-    """What a raster's weights say of samples and numbers, float64; see `vcc.plan.protocol.Engine`.
+    """Gradients of a weighted raster to samples and parameters, float64; see `vcc.plan.protocol.Engine`.
 
-    Of a part of a core that is run with a border of dark views (`vcc.run.drive`), the border's samples are given
-    what rays carry to them, too: that belongs to the neighbours, and is left to them.
+    If part of a core runs with a border of dark views (`vcc.run.drive`), the border's samples also receive
+    gradients from the rays. These belong to the neighbouring parts; the caller drops them.
     """
     if isinstance(core, Footprints):
         return footprints_back(core, values, raster, samples, wanted, progress)
@@ -68,7 +68,7 @@ def back(
 
 
 def footprints(core: Footprints, values: NDArray[Any], progress: Progress | None) -> Partial:
-    """The raster of samples by footprints: the sum above."""
+    """The raster of samples by footprints: the sum in the module's docstring."""
     channels = values.shape[4:] or (1,)
     raster = np.zeros((*core.raster_shape, *channels))
     k, l = indices(core)
@@ -89,7 +89,7 @@ def footprints(core: Footprints, values: NDArray[Any], progress: Progress | None
 def prepared(
     before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
 ) -> NDArray[Any]:
-    """Samples as a core takes them, filtered in double precision; bytes are sharpened exactly."""
+    """Samples as a core reads them, filtered in double precision; samples of 8 bits are sharpened exactly."""
     for operator in before:
         exact = isinstance(operator, operators.SharpenViews) and values.dtype == np.uint8
         moved = isinstance(operator, operators.SwapPixelAxes | operators.DarkBorder)
@@ -107,18 +107,18 @@ def prepared_back(
 
 
 def finished(after: Sequence[operators.After], raster: Array, threads: int) -> Array:
-    """The picture (rows, columns, channels), float64, of a raster."""
+    """The image (rows, columns, channels), float64, from a raster."""
     return np.asarray(operators.finished(after, raster), dtype=np.float64)
 
 
 def memory(core: Footprints | Rays, channels: int, threads: int) -> int:
-    """Bytes that a run takes beside the samples and the raster: the most that was measured, rounded up."""
+    """Bytes that a run needs besides the samples and the raster: the largest measured value, rounded up."""
     if isinstance(core, Rays):
         return memory_of_rays(core)
     rows, columns = (core.refine * count for count in core.samples)
     high, wide = core.raster_shape
-    view = 16 * channels * rows * columns  # in double precision, and times its weights
-    turned = any(mask.step[0, 1] or mask.step[1, 0] for mask in core.masks)  # each sample is looked up by itself
+    view = 16 * channels * rows * columns  # in double precision, and again multiplied by the weights
+    turned = any(mask.step[0, 1] or mask.step[1, 0] for mask in core.masks)  # one lookup per sample
     lookup = (280 if turned else 40) * rows * columns if core.masks else 0
     if core.step[1, 0] == 0 == core.shear:
         spreading = 112 * max(high * rows, wide * columns) + 8 * channels * high * columns
@@ -136,7 +136,7 @@ def _spread(core: Footprints, raster: Array, flux: Array, b: int, a: int, k: Arr
     across = partial(shares, core.interpolation, step=column_step / core.refine, opening=core.opening)
     if (
         core.step[1, 0] == 0 == shear
-    ):  # all columns of samples fall into the same rows, all rows into the same columns
+    ):  # separable: all columns of samples fall on the same rows, all rows on the same columns
         lines = np.tensordot(down(pixel=row[:, None], position=core.y[b, a] + row_step * l), flux, 1)
         raster += across(pixel=column, position=core.x[b, a] + column_step * k) @ lines
         return

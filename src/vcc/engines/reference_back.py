@@ -1,10 +1,11 @@
-"""The reference engine's way back through footprints, plainly, in float64. It defines the derivative.
+"""The backward pass of the reference engine through footprints, plainly, in float64. It defines the derivative.
 
     I(x, y) = scale · Σ_q L(q) · w(view) · Π T(m(q)) · F(x; x(q)) · F(y; y(q))
 
-A sample meets weights G of the raster as H(q) = Σ G(x, y) · F(x; x(q)) · F(y; y(q)). Of all that I is linear in,
-⟨G, dI⟩ = Σ_q H(q) · d(scale · L(q) · w(view) · Π T(m(q))). Where samples move, dF takes the place of F, along one
-axis after the other. Where the frame shears the pixel grid, a sample's column is x(q) + shear · (y − y(q)).
+Weights G of the raster have the value H(q) = Σ G(x, y) · F(x; x(q)) · F(y; y(q)) at sample q. For all factors in
+which I is linear, ⟨G, dI⟩ = Σ_q H(q) · d(scale · L(q) · w(view) · Π T(m(q))). If samples move, dF replaces F,
+along one axis after the other. If the frame shears the pixel grid, a sample's column is x(q) + shear · (y −
+y(q)).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from vcc.plan.protocol import Gradient
 Array = NDArray[np.float64]
 
 MOVING = frozenset(("x", "y", "step", "opening"))
-"""Numbers that say where samples fall and over what."""
+"""Parameters that set where samples fall and the width of their footprints."""
 
 
 def footprints_back(
@@ -40,13 +41,14 @@ def footprints_back(
     wanted: Collection[str],
     progress: Progress | None,
 ) -> Gradient:
-    """The derivative of ⟨raster, the raster of the samples⟩, float64; see `vcc.plan.protocol.Engine.back`.
+    """The derivative of ⟨raster, raster of the samples⟩, float64; see `vcc.plan.protocol.Engine.back`.
 
-    Each number is taken by itself: ``x`` of each tap, ``weights`` also of taps that let no light through. All have
-    a derivative but ``sharpen_samples``, and where samples fall on the nearest pixel those that move them.
+    Parameters are independent: ``x`` of each tap, ``weights`` also of taps whose weight is zero. All have a
+    derivative, except ``sharpen_samples`` and, if samples fall on the nearest pixel, the parameters that move
+    them.
 
     Raises:
-        InputError: a number to which there is no derivative.
+        InputError: a parameter that has no derivative.
     """
     core.check_wanted(wanted)
     channels = values.shape[4] if values.ndim == 5 else 1
@@ -73,7 +75,7 @@ def footprints_back(
 
 
 def indices(core: Footprints) -> tuple[Array, Array]:
-    """Column and row indices k, l of the samples of a view, of finer ones where the plan divides them."""
+    """Column and row indices k, l of the samples of a view, or of finer samples if the plan subdivides them."""
     (rows, columns), refine = core.samples, core.refine
     if refine == 1:
         return np.arange(columns, dtype=float), np.arange(rows, dtype=float)
@@ -82,7 +84,7 @@ def indices(core: Footprints) -> tuple[Array, Array]:
 
 
 def divided(core: Footprints, view: Array) -> Array:
-    """The samples of a view (l, k, channels), divided where the plan says so."""
+    """The samples of a view (l, k, channels), subdivided if the plan does so."""
     if core.refine == 1:
         return view
     return np.asarray(np.einsum("al,bk,lkc->abc", *_divisions(core), view, optimize=True))
@@ -96,7 +98,7 @@ def _divided_back(core: Footprints, fine: Array) -> Array:
 
 
 def _divisions(core: Footprints) -> tuple[Array, Array]:
-    """How rows and columns of samples are divided, as matrices (finer samples, samples)."""
+    """The subdivision of rows and columns of samples, as matrices (finer samples, samples)."""
     rows, columns = core.samples
     return core.division(rows).matrix(rows), core.division(columns).matrix(columns)
 
@@ -114,34 +116,34 @@ class _Tap(Brief):
     @property
     @cached
     def transmissions(self) -> list[Array]:
-        """What each mask lets pass."""
+        """The transmission of each mask at the samples."""
         return [mask.weights(self.b, self.a, self.k, self.l) for mask in self.core.masks]
 
     @property
     def passed(self) -> Array:
-        """What all masks let pass."""
+        """The product of all masks' transmissions."""
         return self.passed_but(-1)
 
     def passed_but(self, left_out: int) -> Array:
-        """What all masks but one let pass."""
+        """The product of the transmissions of all masks but one."""
         rest = [one for n, one in enumerate(self.transmissions) if n != left_out]
         return np.asarray(math.prod(rest, start=np.ones((len(self.l), len(self.k)))))
 
     def down(self, row: int) -> tuple[str, float, Array, float, float]:
-        """Of which samples a raster row takes shares: the arguments of `shares`, (l, k) or (l, 1)."""
+        """Arguments of `shares` for the samples on a raster row, (l, k) or (l, 1)."""
         core = self.core
-        k = self.k if core.step[1, 0] else np.zeros(1)  # else alike for all columns of samples: (l, 1)
+        k = self.k if core.step[1, 0] else np.zeros(1)  # equal for all columns of samples: (l, 1)
         y = core.y[self.b, self.a] + core.step[1, 0] * k[None, :] + core.step[1, 1] * self.l[:, None]
         return core.interpolation, float(row), y, core.row_step / core.refine, core.opening
 
     def across(self, row: int) -> tuple[str, Array, Array, float, float]:
-        """Likewise which columns of samples the pixels of a raster row take, (pixels, k)."""
+        """Arguments of `shares` for the columns of samples on the pixels of a raster row, (pixels, k)."""
         core, pixel = self.core, np.arange(self.core.raster_shape[1], dtype=float)
         x = core.x[self.b, self.a] + core.shear * (row - core.y[self.b, self.a]) + core.column_step * self.k
         return core.interpolation, pixel[:, None], x[None, :], core.column_step / core.refine, core.opening
 
     def gathered(self, weights: Array) -> Array:
-        """H: the raster's weights as each sample meets them."""
+        """H: the raster's weights, summed over the footprint of each sample."""
         met = np.zeros((len(self.l), len(self.k), weights.shape[2]))
         for row, line in enumerate(weights):
             down = shares(*self.down(row))
@@ -150,11 +152,11 @@ class _Tap(Brief):
         return met
 
     def across_shares(self, row: int) -> Array:
-        """F along a raster row, (pixels, k): the same in all rows where nothing shears."""
+        """F along a raster row, (pixels, k): the same in all rows without shear."""
         return shares(*self.across(row)) if self.core.shear else self._shares_of_any_row
 
     def across_slopes(self, row: int) -> tuple[Array, Array, Array]:
-        """`share_slopes` of these."""
+        """`share_slopes` along a raster row."""
         return share_slopes(*self.across(row)) if self.core.shear else self._slopes_of_any_row
 
     @property
@@ -168,7 +170,7 @@ class _Tap(Brief):
         return share_slopes(*self.across(0))
 
     def gradients(self, weights: Array, met: Array, light: Array, wanted: Collection[str]) -> dict[str, Array]:
-        """What the raster's weights say of numbers, through this tap alone; light: L, met: H."""
+        """Gradients to parameters from this tap alone; light: L, met: H."""
         core, b, a = self.core, self.b, self.a
         gradients: dict[str, Array] = {}
         whole = (met * light).sum(axis=2)
@@ -185,7 +187,7 @@ class _Tap(Brief):
         return {name: gradients[name] for name in wanted}
 
     def mask_back(self, n: int, weights: Array) -> dict[str, Array]:
-        """What weights of a mask's transmission at the samples say of the mask."""
+        """Gradients to the mask from weights of its transmission at the samples."""
         mask = self.core.masks[n]
         texture, of_row, of_column = smooth_back(
             mask.texture, *mask.places(self.b, self.a, self.k, self.l), weights
@@ -201,7 +203,7 @@ class _Tap(Brief):
         }
 
     def places_back(self, weights: Array, flux: Array) -> dict[str, Array]:
-        """What the raster's weights say of where samples fall and over what; flux: L · Π T."""
+        """Gradients to the positions and footprints of samples from the raster's weights; flux: L · Π T."""
         core, b, a = self.core, self.b, self.a
         x = y = opening = column_step = shear = 0.0
         step = np.zeros((2, 2))

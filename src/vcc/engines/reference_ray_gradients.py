@@ -1,10 +1,10 @@
-"""What a raster by rays says of the plan's numbers, plainly, in float64. It defines the derivative.
+"""Gradients of a raster by rays to the plan's parameters, plainly, in float64. They define the derivative.
 
     I(x, y) = scale · Σ_rays w · Π T · L(i, j, k, l),
 
-each ray at fixed points of the table. Weights G of the raster give each ray the cotangents scale · Σ_c G_c · L_c
-of its share and share · scale · Σ_c G_c · ∂L_c/∂(i, j, k, l) of its place in the light field; what these say of
-the rays' way is told step by step backwards (`vcc.plan.rays.backwards`).
+each ray at fixed points of the table. Weights G of the raster give each ray the cotangent scale · Σ_c G_c · L_c
+of its share and the cotangent share · scale · Σ_c G_c · ∂L_c/∂(i, j, k, l) of its place in the light field.
+These go backward through the steps of the ray (`vcc.plan.rays.backwards`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from vcc.plan.rays.steps import Bundle
 Array = NDArray[np.float64]
 
 RAYS_AT_ONCE = 2**15
-"""Rays whose whole way is kept at once: some tens of MiB."""
+"""Number of rays whose states are stored at a time: some tens of MiB."""
 
 
 def ray_gradients(
@@ -41,22 +41,22 @@ def ray_gradients(
     threads: int = 1,
     progress: Progress | None = None,
 ) -> Numbers:
-    """The derivative of ⟨raster, what rays make of the samples⟩ to numbers of the core.
+    """The derivative of ⟨raster, raster of the samples⟩ to parameters of the core.
 
     Args:
-        core: what is traced.
+        core: the rays to trace.
         values: samples (v, u, t, s[, channels]).
-        raster: weights of the picture's values, (rows, columns, channels).
-        wanted: names of numbers (`vcc.plan.parameters.numbers` of the core).
-        beside: 0, or 1 for the blocks of points beside those of the first round.
+        raster: weights of the raster's values, (rows, columns, channels).
+        wanted: names of parameters (`vcc.plan.parameters.numbers` of the core).
+        beside: 0 for the blocks of points of the first round, 1 for the blocks next to them.
         threads: not used.
         progress: called with (done, total) in pixels.
 
     Returns:
-        For each name an array of its number's shape.
+        An array for each name, of the parameter's shape.
 
     Raises:
-        InputError: a number that moves nothing but a hard edge which rays run into.
+        InputError: a parameter that only moves a hard edge which rays meet.
     """
     edges.check_no_edge(core, wanted)
     channels = values.shape[4] if values.ndim == 5 else 1
@@ -74,7 +74,7 @@ def ray_gradients(
 def _of_pixels(
     core: Rays, samples: Array, weights: Array, pixel: NDArray[np.int64], block: NDArray[np.int64]
 ) -> Iterator[tuple[str, Array]]:
-    """What some pixels' weights (pixels, channels) say of the numbers, by name."""
+    """Gradients to the parameters from the weights (pixels, channels) of some pixels, by name."""
     rays, cells = core.aimed(pixel, block)
     way = [replace(rays)]
     for step in core.steps:
@@ -96,7 +96,7 @@ def _of_pixels(
 
 
 def _sensor_back(core: Rays, rays: Bundle, behind: Bundle, pixel: NDArray[np.int64]) -> Numbers:
-    """x = first pixel + column · pitch + place in the pixel · sensitive size, likewise y."""
+    """Backward of x = first pixel + column · pitch + place in the pixel · sensitive size, likewise y."""
     row, column = (each[:, None, None] for each in np.divmod(pixel, core.raster_shape[1]))
     both = ((behind.x, column, rays.points[..., 0]), (behind.y, row, rays.points[..., 1]))
     return {
@@ -108,7 +108,7 @@ def _sensor_back(core: Rays, rays: Bundle, behind: Bundle, pixel: NDArray[np.int
 
 @dataclass(repr=False)
 class _Found(Brief):
-    """What rays find in the light field, times their pixels' weights: value, and its derivatives.
+    """Looked-up values of rays times their pixels' weights, and the derivatives.
 
     Args:
         value: (…).
@@ -122,7 +122,7 @@ class _Found(Brief):
 
 
 def _looked_up_back(core: Rays, samples: Array, weights: Array, rays: Bundle) -> tuple[Bundle, Numbers]:
-    """What the light field says of rays at the end of their way, and of the numbers by which it is looked up."""
+    """Cotangents of the rays at the end of their path, and gradients of the lookup's parameters."""
     index = core.index_from_ray(np.stack([rays.x, rays.y, rays.s, rays.t], axis=-1))
     inside = core.inside(index)
     found = _found(core, samples, weights[:, None, None], index, rays.share * inside * core.scale)
@@ -138,14 +138,14 @@ def _looked_up_back(core: Rays, samples: Array, weights: Array, rays: Bundle) ->
 
 
 def _found(core: Rays, samples: Array, weights: Array, index: Array, carried: Array) -> _Found:
-    """What rays find, interpolated in all four dimensions; see `vcc.engines.rays`.
+    """Values and derivatives at the places of rays, interpolated in four dimensions; see `vcc.engines.rays`.
 
     Args:
-        core: what is traced.
+        core: the rays.
         samples: (samples, channels).
         weights: of the channels, (pixels, 1, 1, channels).
         index: (…, 4), places in the light field.
-        carried: what each ray carries.
+        carried: light of each ray.
     """
     value, to_index, to_motion = np.zeros(index.shape[:-1]), np.zeros_like(index), np.zeros((2, 2))
     for view in views_around(core, index):
@@ -164,7 +164,7 @@ def _found(core: Rays, samples: Array, weights: Array, index: Array, carried: Ar
 
 
 def _in_view(core: Rays, samples: Array, weights: Array, view: ViewAround) -> tuple[Array, Array, Array]:
-    """What a view holds where rays fall, dark outside, times weights, and its derivatives to (k, l)."""
+    """Values of a view at the places of rays, dark outside, times weights, and the derivatives to (k, l)."""
     value, to_k, to_l = (np.zeros(view.number.shape) for _ in range(3))
     for at, inside, (across, down), (sign_k, sign_l) in samples_around(core, view):
         sample = np.sum(weights * samples[at], axis=-1) * inside

@@ -1,4 +1,4 @@
-"""Filtering a view's samples along both axes in one pass; see `vcc.engines.sharpening`."""
+"""Filter a view's samples along both axes in one pass; see `vcc.plan.operators.SharpenViews`."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from vcc.plan.operators import WEIGHT_DIGITS as DIGITS
 _compiled = compiled(fastmath={"contract", "nsz"})
 SHIFT = 2 * DIGITS - KEPT_DIGITS
 AT_ONCE = 32
-"""Numbers that vectorised loops take at once: whole multiples leave them no rest."""
+"""Numbers that vectorised loops process at a time: multiples of it leave no remainder loop."""
 
 
 def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int | None = None) -> NDArray[Any]:
-    """Samples (v, u, t, s[, channels]) filtered: int16 of uint8, else in floating point, double of double."""
+    """Filter samples (v, u, t, s[, channels]): uint8 gives int16, float64 stays, all others give float32."""
     given, wide = _kinds(values.dtype)
     kept = np.empty(values.shape, dtype=wide)
     factors, whole = _factors(weights, values.dtype)
@@ -45,7 +45,7 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
 
 
 class ToSharpen:
-    """Samples that are filtered when they are looked at, in parts or as a whole.
+    """Samples that are filtered when they are read, in parts or as a whole.
 
     Args:
         weights: of the filter.
@@ -59,22 +59,22 @@ class ToSharpen:
 
     @property
     def bytes_kept(self) -> int:
-        """Of a pixel in parts that are filtered."""
+        """Bytes of a pixel in filtered parts."""
         return _kept_in_parts(self._values.dtype).itemsize * (self.shape[4] if len(self.shape) == 5 else 1)
 
     def parts(self, size: tuple[int, int]) -> Parts:
-        """Parts of so many rows and columns of pixels."""
+        """Parts with this number of rows and columns of pixels."""
         return Parts(self._weights, self._values, size)
 
     def whole(self, threads: int) -> NDArray[Any]:
-        """All of them filtered, once for several rounds of rays."""
+        """All samples filtered, once for several rounds of rays."""
         if self._whole is None:
             self._whole = filtered(self._weights, self._values, threads)
         return self._whole
 
 
 class Parts:
-    """Parts of all views, filtered when they are looked at.
+    """Parts of all views, filtered when they are read.
 
     Args:
         weights: of the filter.
@@ -90,7 +90,7 @@ class Parts:
         self.kind, self.size = _kept_in_parts(values.dtype), size
 
     def buffers(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Where parts are put, flat and `AT_ONCE` numbers longer than they are, and where rows are filtered."""
+        """Buffers for the parts, flat and `AT_ONCE` numbers longer than needed, and for a row that is filtered."""
         length = self.size[1] * self.channels
         count = int(np.prod(self._views.shape[:2])) * self.size[0] * length
         return np.zeros(count + AT_ONCE, dtype=self.kind), _line(self._factors, length, self.channels)
@@ -102,20 +102,20 @@ class Parts:
         parts: NDArray[Any],
         line: NDArray[Any],
     ) -> None:
-        """Filter the parts that begin at some row in each row of views, and at some column in each column of them.
+        """Filter the part of each view that begins at its row of views' ``rows`` and its column's ``columns``.
 
         Args:
             rows: (v,).
             columns: (u,).
-            parts: room for them.
-            line: likewise.
+            parts: buffer for the parts, from `buffers`.
+            line: buffer for a row, from `buffers`.
         """
         views, filtering = self._views, (self.channels, self._factors, self._whole)
         sharpen(views, views.reshape(-1), (rows, columns), self.size, parts, *filtering, line)
 
 
 def _kinds(kind: np.dtype[Any]) -> tuple[np.dtype[Any], np.dtype[Any]]:
-    """In what types samples of a type are filtered, and are kept then."""
+    """The types in which samples of a type are filtered, and in which the results are stored."""
     if kind == np.uint8:
         return kind, np.dtype(np.int16)
     wide = np.dtype(np.float64 if kind == np.float64 else np.float32)
@@ -123,28 +123,28 @@ def _kinds(kind: np.dtype[Any]) -> tuple[np.dtype[Any], np.dtype[Any]]:
 
 
 def _kept_in_parts(kind: np.dtype[Any]) -> np.dtype[Any]:
-    """In what type parts of samples of a type are kept, which rays look up at once."""
+    """The type in which filtered parts are stored; rays read them directly."""
     return np.dtype(np.int16 if kind == np.uint8 else np.float32)
 
 
 def _factors(weights: tuple[int, int, int], kind: np.dtype[Any]) -> tuple[NDArray[Any], bool | None]:
-    """Weights as `sharpen` takes them, and whether they are whole numbers."""
+    """Weights as `sharpen` expects them; True if they are integers, else None."""
     if kind == np.uint8:
         return np.array(weights, dtype=np.int32), True
     return (np.array(weights) * 2.0**-DIGITS).astype(_kinds(kind)[1]), None
 
 
 def _line(factors: NDArray[Any], length: int, channels: int) -> NDArray[Any]:
-    """Room for a row of sums, longer by what is looked at on each side, and by what loops take at once."""
+    """A buffer for a row of sums, with `REACH` pixels on each side, and `AT_ONCE` further numbers."""
     return np.zeros(length + 2 * REACH * channels + AT_ONCE, dtype=factors.dtype)
 
 
 def given_back(
     weights: tuple[int, int, int], values: NDArray[Any], threads: int, written_over: bool = False
 ) -> NDArray[np.float32]:
-    """The transpose of `filtered`, float32: what weights of filtered samples say of the samples as given.
+    """The transpose of `filtered`, float32: gradients of filtered samples to the samples.
 
-    Rounding is left out, and so is the unit of what 8 bits become: see `vcc.plan.protocol.Engine.prepared_back`.
+    Rounding and the unit of filtered 8-bit samples are left out: see `vcc.plan.protocol.Engine.prepared_back`.
     """
     in_place = written_over and values.dtype == np.float32 and values[0, 0].flags.c_contiguous
     found = values if in_place else np.empty(values.shape, dtype=np.float32)
@@ -165,21 +165,21 @@ def given_back(
 
 @_compiled
 def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  # type: ignore[no-untyped-def]
-    """A part of each view filtered along both axes.
+    """Filter a part of each view along both axes.
 
     Args:
         views: (v, u, rows, samples in a row).
-        others: the same, flat, where parts are taken: up to `AT_ONCE` numbers may then be written after the last,
-            as loops of short rows that have a rest take longer. None for whole views.
-        begin: (v,), the first row of the parts of a row of views; (u,), the first pixel of a row of the parts of a
-            column of views.
+        others: the same, flat, for parts; None for whole views. With parts, up to `AT_ONCE` numbers may be
+            written after the last one, as a remainder loop for each short row takes longer.
+        begin: (v,), the first row of the parts of a row of views; (u,), the first pixel of a row of the parts of
+            a column of views.
         size: rows, and pixels in a row, of a part.
-        kept: where to write, flat, in the order (v, u, row, sample).
-        channels: numbers a pixel.
-        weights: (3,) of the type of the sums: of 8-bit samples int32 in 2⁻¹⁰, for which
+        kept: output, flat, in the order (v, u, row, sample).
+        channels: values per pixel.
+        weights: (3,) of the type of the sums: int32 in units of 2⁻¹⁰ for 8-bit samples, with
             |Σ| ≤ 255·(1398 + 2·207 + 2·20)² < 2³⁰ for means; else real numbers.
         whole: True for 8-bit samples, whose sums are rounded to `KEPT_DIGITS` digits after the point; else None.
-        line: room for a row of sums, longer by `REACH` pixels on each side and by `AT_ONCE` numbers.
+        line: buffer for a row of sums, with `REACH` pixels on each side and `AT_ONCE` further numbers.
     """
     _, nu, rows, row = views.shape
     pixels, half, kind = row // channels, 1 << (SHIFT - 1), weights.dtype.type
@@ -189,7 +189,7 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
     end, across = length + 2 * REACH * channels, length
     if others is not None:
         across = (length + AT_ONCE - 1) // AT_ONCE * AT_ONCE
-    # Slices, as numbers that are subtracted might be negative for all that the compiler knows.
+    # Slices, because the compiler cannot rule out that an index with a subtraction is negative.
     left2, left1, here = line, line[channels:], line[2 * channels :]
     right1, right2 = line[3 * channels :], line[4 * channels :]
     for part in range(views.shape[0] * nu):
@@ -201,17 +201,17 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
         if others is not None:
             down = (inner + AT_ONCE - 1) // AT_ONCE * AT_ONCE
         for r in range(first, first + size[0]):
-            if others is not None and i + 1 < nu:  # the same row of the next part, which lies elsewhere
+            if others is not None and i + 1 < nu:  # the same row of the next part, elsewhere in memory
                 place = ((part + 1) * rows + r) * row + max(first_columns[i + 1] - REACH, 0) * channels
                 for q in range(place, place + inner + per_line, per_line):
                     prefetch(others, q)
-            # Beyond a border its last samples go on.
+            # Beyond a border, its last samples are repeated.
             lowest = min(r + 2, rows - 1)
             above2, above, level = view[max(r - 2, 0)], view[max(r - 1, 0)], view[r]
             below, below2 = view[min(r + 1, rows - 1)], view[lowest]
             above2, above, level = above2[low * channels :], above[low * channels :], level[low * channels :]
             below, below2 = below[low * channels :], below2[low * channels :]
-            if down > (rows - lowest) * row - low * channels:  # no more can be read
+            if down > (rows - lowest) * row - low * channels:  # stay in bounds
                 down = inner
             for q in range(down):
                 sums[q] = (
@@ -226,7 +226,7 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
             to = kept[(part * size[0] + r - first) * length :]
             for q in range(across):
                 total = middle * here[q] + near * (left1[q] + right1[q]) + far * (left2[q] + right2[q])
-                if whole is None:  # told apart when compiled
+                if whole is None:  # resolved at compile time
                     to[q] = total
                 else:
                     to[q] = np.int32(total + half) >> SHIFT
@@ -236,12 +236,12 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
 def give_back(view, found, channels, weights):  # type: ignore[no-untyped-def]
     """The transpose of `sharpen`, for real numbers.
 
-    The filter is even, so that it is its own transpose but at the border: there the last samples went on, and get
-    back what was taken from beyond them.
+    The filter is even: it is its own transpose, except at the border. There the last samples were repeated, so
+    they also receive the gradients of the samples beyond them.
     """
     rows, length = view.shape
     middle, near, far = weights[0], weights[1], weights[2]
-    # What lies beyond a border took nothing from anybody: zero, along rows and beyond the first and last of them.
+    # Gradients beyond a border are zero, along rows and beyond the first and last row.
     lines, padded = np.zeros((5, length), view.dtype), np.zeros(length + 2 * REACH * channels, view.dtype)
     left2, left, here = padded, padded[channels:], padded[2 * channels :]
     right, right2 = padded[3 * channels :], padded[4 * channels :]
@@ -272,16 +272,16 @@ def give_back(view, found, channels, weights):  # type: ignore[no-untyped-def]
                 found[r, q] += (near + far) * level[q] + far * above[q]
 
 
-# --- asking for memory before it is looked at, for loops that would wait for it ---
+# --- prefetching, for loops that would wait for memory ---
 
 
 LINE = 64
-"""Bytes that memory brings at a time."""
+"""Bytes of a cache line."""
 
 
 @intrinsic
 def prefetch(typing_context, values, at):  # type: ignore[no-untyped-def]
-    """Ask for the line of memory that holds a number of a contiguous array, in bounds or not."""
+    """Prefetch the cache line of an element of a contiguous array; the index may be out of bounds."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
@@ -289,7 +289,7 @@ def prefetch(typing_context, values, at):  # type: ignore[no-untyped-def]
         number = ir.IntType(32)
         kind = ir.FunctionType(ir.VoidType(), [place.type, number, number, number])
         function: Any = builder.module.declare_intrinsic("llvm.prefetch", [place.type], kind)
-        # to read, to be kept in all caches, data
+        # read access, all cache levels, data
         builder.call(function, [place, *(ir.Constant(number, n) for n in (0, 3, 1))])
         return context.get_dummy_value()
 

@@ -1,7 +1,7 @@
 """Costs of a plane sweep, by compiled loops; see `vcc.fields.plane_sweep`.
 
-Several threads try planes at once. One thread computes each plane's cost, so that the result does not depend on
-the number of threads.
+Several threads process planes concurrently. One thread computes each plane's cost, so the result does not depend
+on the number of threads.
 """
 
 from __future__ import annotations
@@ -21,23 +21,23 @@ from vcc.plan.how import cores
 FASTMATH = {"contract", "nsz", "reassoc"}
 _compiled, _with_memory = compiled(borrowing=True, fastmath=FASTMATH), compiled(fastmath=FASTMATH)
 TRUNCATION = 0.02
-"""Of full scale, on the square-root scale: a difference that is no match, whatever its size."""
+"""Fraction of full scale, on the square-root scale: larger differences count as no match, whatever their size."""
 CONTRAST = 0.02
-"""Of full scale, likewise: contrast from which on the guide shows a border."""
+"""Fraction of full scale, likewise: contrast above which the guide shows a border."""
 RISE = 0.033
-"""Cost, for each row or column of views, of a disparity that changes by a pixel per view from pixel to pixel."""
+"""Cost per row or column of views if the disparity changes by a pixel per view between neighbouring pixels."""
 JUMP = 0.04
-"""Likewise, at most: of a border. It is less where the guide shows one."""
+"""Largest cost of a border, likewise. It is lower where the guide shows a border."""
 ALIKE = 1e-6
-"""Costs without texture differ by rounding alone, of full scale."""
+"""Fraction of full scale: costs without texture differ by rounding only."""
 ON_SURFACE, SAME_SURFACE = 3, 0.15
-"""Over so many pixels on each side disparities are averaged that differ by less, pixels per view."""
+"""Disparities that differ by less (in pixels per view) are averaged over this many pixels on each side."""
 BAND = 32
-"""Rows or columns of pixels that one thread walks along at once."""
+"""Rows or columns of pixels that one thread processes at a time."""
 STEP_AT_BORDER = 0.1
-"""Of full scale, on the square-root scale: from pixel to pixel of the guide, where a border costs half as much."""
+"""Step of the guide between neighbouring pixels at which a border costs half, on the scale of `TRUNCATION`."""
 AROUND = 3
-"""Pixels a side over which differences are averaged before the better half of the views is chosen."""
+"""Side, in pixels, of the window over which differences are averaged before choosing the better half of views."""
 
 
 def costs(
@@ -47,14 +47,14 @@ def costs(
     window: int,
     progress: Progress | None = None,
 ) -> Array:
-    """How much views disagree with the middle one, gathered over a window that follows borders, (planes, t, s).
+    """Differences between views and the middle one, averaged over a window that follows borders, (planes, t, s).
 
     Args:
-        cross: rows of views, each with its middle view (levels, channels, t, s) as soft as interpolation by
-            fractions of a pixel 0 … ½ makes it.
+        cross: rows of views, each with its middle view (levels, channels, t, s), blurred as by interpolation at
+            fractions of a pixel 0 … ½.
         tried: disparities along each row of views, pixels per view.
-        guide: the middle view, (t, s), of which the window follows the borders.
-        window: its side, pixels, an odd number.
+        guide: the middle view, (t, s); the window follows its borders.
+        window: side of the window, pixels, an odd number.
         progress: called with (done, total).
     """
     found = np.empty((len(tried[0]), *guide.shape), np.float32)
@@ -86,16 +86,16 @@ def costs(
 
 
 def smoothest(costs: Array, guide: Array, step: float, arms: int) -> NDArray[np.int32]:
-    """Which plane each pixel is in if surfaces are smooth, (t, s); the middle one where all are alike.
+    """The plane of each pixel for smooth surfaces, (t, s); the middle plane if all costs are equal.
 
-    From four sides, along rows and columns, the least cost of a path of disparities that ends in each plane is
-    summed (Hirschmüller 2008): a pixel whose own cost says little takes the surface around it.
+    The least costs of paths of disparities that end in each plane are summed over four directions, along rows
+    and columns (Hirschmüller 2008): a pixel with little texture takes the surface around it.
 
     Args:
         costs: (planes, t, s).
         guide: (t, s), see `costs`.
         step: between neighbouring planes, pixels per view.
-        arms: rows and columns of views of which costs are sums.
+        arms: number of rows and columns of views in the sum of costs.
     """
     planes, rows, columns = costs.shape
     rise, jump = np.float32(RISE * step * arms), np.float32(JUMP * arms)
@@ -111,7 +111,7 @@ def smoothest(costs: Array, guide: Array, step: float, arms: int) -> NDArray[np.
 
 
 def means_of_surfaces(disparity: Array, weights: Array) -> Array:
-    """Disparities averaged over the same surface around, by weights; all (t, s). Of weight 0 they stay."""
+    """Weighted means of disparities over the same surface; all (t, s). Disparities of weight 0 are unchanged."""
     found = np.empty_like(disparity)
     with Workers(cores()) as pool:
         rows = len(disparity)
@@ -121,7 +121,7 @@ def means_of_surfaces(disparity: Array, weights: Array) -> Array:
 
 
 def _disagreement(arm: Arm, soft: Array, disparity: float) -> Array:
-    """How much the better half of a row of views differs from its middle one at a disparity, (t, s)."""
+    """Difference of the better half of a row of views from its middle view at a disparity, (t, s)."""
     views, middle = arm.views, arm.middle
     best = np.full(views.shape[2:], np.inf, np.float32)
     around, sums = np.empty_like(best), np.empty(views.shape[-1])
@@ -133,7 +133,7 @@ def _disagreement(arm: Arm, soft: Array, disparity: float) -> Array:
             shift = -disparity * (n - middle)
             whole = math.floor(shift)
             weights = np.array(cubic_weights(shift - whole), np.float32)
-            # Interpolation softens noise, most so between pixels: unless the middle view is as soft, disparities
+            # Interpolation blurs noise, most between pixels: without equal blur of the middle view, disparities
             # that fall there seem to fit better.
             alike = soft[round(2 * (len(soft) - 1) * abs(shift - round(shift)))]
             _add_difference(views[n], alike, whole, weights, arm.axis == 2, total)
@@ -145,7 +145,7 @@ def _disagreement(arm: Arm, soft: Array, disparity: float) -> Array:
 
 @_compiled
 def _add_difference(view, alike, whole, weights, across, total):  # type: ignore[no-untyped-def]
-    """Add |view read so many pixels further on − alike|, truncated, over channels."""
+    """Add |view shifted by ``whole`` pixels and interpolated − alike|, truncated, over channels."""
     channels, rows, columns = view.shape
     w0, w1, w2, w3 = weights[0], weights[1], weights[2], weights[3]
     most = np.float32(TRUNCATION)
@@ -154,7 +154,7 @@ def _add_difference(view, alike, whole, weights, across, total):  # type: ignore
             if across:
                 first = min(max(1 - whole, 0), columns)
                 last = max(min(columns - whole - 2, columns), first)
-                for n in range(columns - (last - first)):  # beyond the view's borders, these go on
+                for n in range(columns - (last - first)):  # at the view's borders, the last pixel is repeated
                     x = n if n < first else n + last - first
                     p = x + whole
                     value = w0 * view[c, y, min(max(p - 1, 0), columns - 1)]
@@ -181,7 +181,7 @@ def _add_difference(view, alike, whole, weights, across, total):  # type: ignore
 def _box(values, window, out, sums):  # type: ignore[no-untyped-def]
     """The mean over a window, an odd number of pixels a side; borders repeated.
 
-    ``sums``: of columns, double, so that what is added and taken away again leaves nothing.
+    ``sums``: of columns, in double precision, so that adding and subtracting a value leaves no error.
     """
     rows, columns = values.shape
     half = window // 2
@@ -207,7 +207,7 @@ def _box(values, window, out, sums):  # type: ignore[no-untyped-def]
 
 @_with_memory
 def _walk(before, cost, border, rise, jump, after):  # type: ignore[no-untyped-def]
-    """Costs of paths one pixel further on, above the least of those that lead there; all (planes,)."""
+    """Costs of paths one pixel further, relative to the least cost of the paths so far; all (planes,)."""
     planes = len(cost)
     least = before[0]
     for n in range(1, planes):
@@ -253,7 +253,7 @@ def _along_rows(costs, guide, rise, jump, sums, first, last):  # type: ignore[no
 
 @_with_memory
 def _along_columns(costs, guide, rise, jump, sums, first, last, best):  # type: ignore[no-untyped-def]
-    """Add the costs of paths from above and from below to columns of the sums, and find the least."""
+    """Add the costs of paths from above and from below to columns of the sums, and find the minimum."""
     planes, rows, _ = costs.shape
     width = last - first
     cost, before = np.empty((width, planes), np.float32), np.empty((width, planes), np.float32)
@@ -280,7 +280,7 @@ def _along_columns(costs, guide, rise, jump, sums, first, last, best):  # type: 
                         highest = max(highest, total[m])
                         n = m if total[m] < total[n] else n
                     alike = highest - total[n] < ALIKE
-                    best[y, first + x] = planes // 2 if alike else n  # the middle one is at no end
+                    best[y, first + x] = planes // 2 if alike else n  # the middle plane, as far from both ends
 
 
 @_compiled

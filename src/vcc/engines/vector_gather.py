@@ -1,9 +1,8 @@
-"""Adding up what a ray finds in four views as vector instructions.
+"""Sum the samples of a ray in four views with vector instructions.
 
-A ray interpolates between two by two views, and in each between two by two pixels. In memory the two pixels of
-a row are neighbours, channels and all, so that one vector load brings both. Numba does not vectorise such short
-runs by itself; here they are written in its intermediate language, for one, three and four channels and any
-sample type.
+A ray interpolates between 2×2 views, and in each view between 2×2 pixels. The two pixels of a row are neighbours
+in memory, with all channels, so one vector load reads both. Numba does not vectorise such short runs. Here they
+are written in LLVM's intermediate representation, for one, three and four channels and any sample type.
 """
 
 from __future__ import annotations
@@ -16,32 +15,32 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 LANES = 8
-"""Numbers that a sum holds; the channels of the left pixel come first, then those of the right."""
+"""Numbers in a sum: first the channels of the left pixel, then those of the right one."""
 
 
 def _add_views(channels: int) -> Any:
-    """The intrinsic for a number of channels: sums[at : at + 8] += what four views hold, interpolated."""
+    """The intrinsic for a number of channels: sums[at : at + 8] += the interpolated values of four views."""
     lanes = 2 if channels == 1 else LANES
 
     @intrinsic
     def add_views(typing_context, values, corners, line, rows, columns, sums, at):  # type: ignore[no-untyped-def]
-        """What a ray finds in two by two views, two by two pixels in each.
+        """Interpolate 2×2 pixels in each of 2×2 views at the place of a ray.
 
-        The views of one row are looked at in the same rows of pixels, those of one column in the same columns: so
-        a sample's weight is that of its row times that of its column.
+        Views of one row read the same rows of pixels, views of one column the same columns: the weight of a
+        sample is the weight of its row times that of its column.
 
         Args:
             typing_context: Numba's.
-            values: flat samples; ``LANES`` of them can be read from every place that is looked at.
-            corners: (4,) where the upper left pixel of the upper left view begins, of the upper right, the lower
-                left and the lower right view.
+            values: flat samples; ``LANES`` of them must be readable from every place read.
+            corners: (4,) where the upper left pixel begins in the upper left, upper right, lower left and lower
+                right view.
             line: samples in a row of pixels.
             rows: (4,) float32, weights of the upper and the lower row of pixels in the upper views, and in the
                 lower views.
-            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in the
-                right views.
+            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in
+                the right views.
             sums: contiguous float32.
-            at: how many numbers of ``sums`` stand before the eight.
+            at: offset of the eight numbers in ``sums``.
         """
         place, weights = types.int64, types.UniTuple(types.float32, 4)
         signature = types.void(values, types.UniTuple(place, 4), place, weights, weights, sums, place)
@@ -105,31 +104,31 @@ add_views_of_3 = _add_views(3)
 add_views_of_4 = _add_views(4)
 
 
-# --- the other way: handing what a ray carries to samples of four views ---
+# --- the transpose: add the gradient of a ray to samples of four views ---
 
 
 def _spread_views(channels: int) -> Any:
-    """The intrinsic for a number of channels: what four views hold += weights of a pixel's values, shared out."""
+    """The intrinsic for a number of channels: values of four views += gradients of a pixel."""
     lanes = 2 * channels
 
     @intrinsic
     def spread_views(typing_context, values, corners, line, rows, columns, weights, pixel):  # type: ignore[no-untyped-def]
-        """Add to two by two pixels of two by two views what they add to a pixel's value.
+        """Add a pixel's gradient to 2×2 pixels of 2×2 views; the transpose of `add_views`.
 
-        Nothing else is written: other threads may work on samples beside these.
+        Nothing else is written: other threads may write to neighbouring samples.
 
         Args:
             typing_context: Numba's.
-            values: flat float32 or float64, to be added to.
-            corners: (4,) where the upper left pixel of the upper left view begins, of the upper right, the lower
-                left and the lower right view.
+            values: flat float32 or float64, to add to.
+            corners: (4,) where the upper left pixel begins in the upper left, upper right, lower left and lower
+                right view.
             line: samples in a row of pixels.
             rows: (4,) float32, weights of the upper and the lower row of pixels in the upper views, and in the
                 lower views.
-            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in the
-                right views.
+            columns: (4,) float32, weights of the left and the right column of pixels in the left views, and in
+                the right views.
             weights: flat float32.
-            pixel: where in ``weights`` the pixel's begin, one for each channel.
+            pixel: where the pixel's weights begin in ``weights``, one for each channel.
         """
         place, four = types.int64, types.UniTuple(types.float32, 4)
         signature = types.void(values, types.UniTuple(place, 4), place, four, four, weights, place)

@@ -1,7 +1,7 @@
-"""Rows of samples against rows of weights, as vector instructions: what `vcc.engines.vector_sums` does, backwards.
+"""Products of rows of samples and rows of weights, as vector instructions: `vcc.engines.vector_sums` transposed.
 
-All arrays are flat and of float32, but samples, which are of any type; places in them are int64. Rows are
-``LANES`` values long, or a multiple of that.
+All arrays are flat and float32, except samples, which have any type; offsets are int64. The length of rows is a
+multiple of ``LANES``.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def _keep(builder: Any, values: Any, data: Any, place: Any) -> None:
 
 
 def _along(builder: Any, start: Any, length: Any, step: int, body: Callable[[Any], None]) -> None:
-    """Do for each place from ``start`` to before ``length``, in steps."""
+    """Run ``body`` for each place from ``start`` to before ``length``, in steps."""
     with cgutils.for_range_slice(builder, start, length, constant(step), PLACE) as (x, _):
         body(x)
 
@@ -51,21 +51,21 @@ def _along(builder: Any, start: Any, length: Any, step: int, body: Callable[[Any
 def _four_rows(fresh: bool, last: bool = False, channels: int = 1) -> Any:
     @intrinsic
     def four_rows(typing_context, planes, place, step, shares, values, at, length, out):  # type: ignore[no-untyped-def]
-        """out[x] = Σ shares[t] · planes[place + t · step + x] of four rows, or added to what is there.
+        """out[x] = Σ shares[t] · planes[place + t · step + x] over four rows t, or added to ``out``.
 
-        The last of several times four rows multiplies that by samples, and adds up their three channels: into
-        out[x / 3].
+        For more than four rows, the last four also multiply the sum by samples. With three channels they add
+        these up, into out[x / 3].
 
         Args:
             typing_context: Numba's.
             planes: rows of weights.
             place: where the first row begins.
-            step: from a row to the next.
+            step: offset from a row to the next.
             shares: four float32.
             values: samples.
             at: where their row begins.
-            length: how many.
-            out: the result. Of three channels out[x / 3] is written after what is there at x has been read.
+            length: number of values.
+            out: the result. With three channels, out[x / 3] is written after out[x] has been read.
         """
         place_kind, four = types.int64, types.UniTuple(types.float32, 4)
         signature = types.void(planes, place_kind, place_kind, four, values, place_kind, place_kind, out)
@@ -123,7 +123,7 @@ def four_dots(typing_context, values, planes, place, step, length):  # type: ign
         run, rows = (_data(context, builder, signature, arguments, n) for n in (0, 1))
         _, _, begin, step, length = arguments
         begins = [builder.add(begin, builder.mul(constant(t), step)) for t in range(4)]
-        # Two vectors at once: a sum waits for the one before it.
+        # Two vectors at a time: each addition to a sum waits for the one before it.
         totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(4)] for _ in range(2)]
         for total in (total for pair in totals for total in pair):
             builder.store(ir.Constant(WIDE, [0.0] * LANES), total)
@@ -147,7 +147,7 @@ def four_dots(typing_context, values, planes, place, step, length):  # type: ign
         for t in range(4):
             total = builder.fadd(builder.load(totals[0][t]), builder.load(totals[1][t]))
             lanes = LANES
-            while lanes > 1:  # halves onto each other
+            while lanes > 1:  # add halves
                 lanes //= 2
                 halves = [
                     builder.shuffle_vector(
@@ -171,8 +171,8 @@ def _weighed(repeat: int) -> Any:
             typing_context: Numba's.
             values: samples.
             at: where their row begins.
-            weights: one a sample.
-            length: how many weights.
+            weights: one per sample.
+            length: number of weights.
             out: the result.
         """
         signature = types.void(values, types.int64, weights, types.int64, out)

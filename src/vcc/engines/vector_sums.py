@@ -1,8 +1,8 @@
-"""Adding up rows of samples, and mixing their sums, as vector instructions that stay in the processor's registers.
+"""Sum rows of samples, and mix the sums, with vector instructions that keep them in registers.
 
-A sample is loaded and converted once for four rows of the raster, and their sums do not leave the registers until
-all rows of samples have been added. Numba vectorises neither by itself, so that both are written in its
-intermediate language, for any type of samples; the compiler makes of it what the processor has.
+A sample is loaded and converted once for four rows of the raster. Their sums stay in registers until all rows of
+samples have been added. Numba does not vectorise these loops. Here they are written in LLVM's intermediate
+representation, for any type of samples; LLVM selects the instructions of the processor.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 ROWS = 4
-"""Rows of the raster that are summed at once."""
+"""Number of rows of the raster that are summed together."""
 
 RANGES = [(first, last) for first in range(ROWS) for last in range(first, ROWS)]
-"""Which of them a row of samples can reach: from one row to another. Rows are listed range by range."""
+"""The (first, last) of these rows that a row of samples can reach. Rows are listed range by range."""
 
 
 def _wide_registers() -> bool:
     try:
         return bool(llvmlite.binding.get_host_cpu_features().get("avx512f"))
-    except RuntimeError:  # a processor that LLVM cannot tell apart: narrow vectors suit all
+    except RuntimeError:  # a processor unknown to LLVM: narrow vectors run everywhere
         return False
 
 
 LANES, VECTORS = (16, 4) if _wide_registers() else (8, 2)
-"""Numbers in a vector, and vectors along a row, so that the sums of four rows take half of the registers."""
+"""Numbers in a vector, and vectors along a row: the sums of four rows take half of the registers."""
 RUN = LANES * VECTORS
-"""Sample values of a row that `add_rows` adds at once."""
+"""Sample values of a row that `add_rows` adds at a time."""
 RUN_OF_THREES = 3 * LANES
-"""Likewise with masks and three channels: whole pixels."""
+"""The same with masks and three channels: whole pixels."""
 SHORTEST = max(RUN, RUN_OF_THREES)
-"""Rows are at least so long; what is shorter is continued by zeros."""
+"""Least length of rows; shorter rows are padded with zeros."""
 
 WIDE = ir.VectorType(ir.FloatType(), LANES)
 PLACE, NUMBER = ir.IntType(64), ir.IntType(32)
@@ -48,8 +48,8 @@ FLAGS = ["contract"]
 
 
 def aligned_buffer(*shape: int) -> NDArray[np.float32]:
-    """An array whose first number stands where a vector may begin: one that lies across two lines of the cache
-    takes as long as two. NumPy's own arrays begin anywhere.
+    """An array that begins at a multiple of a vector's size. A vector that crosses two cache lines takes twice as
+    long to read, and NumPy's arrays may begin anywhere.
     """
     size = math.prod(shape)
     wide = np.empty(size + LANES, dtype=np.float32)
@@ -58,24 +58,24 @@ def aligned_buffer(*shape: int) -> NDArray[np.float32]:
 
 
 def constant(number: int) -> Any:
-    """A place or a number of them."""
+    """An offset or a count as a constant."""
     return ir.Constant(PLACE, number)
 
 
 def everywhere(builder: Any, scalar: Any, lanes: int = LANES) -> Any:
-    """A scalar in all lanes of a vector."""
+    """A vector with a scalar in all lanes."""
     empty = ir.Constant(ir.VectorType(scalar.type, lanes), ir.Undefined)
     first = builder.insert_element(empty, scalar, ir.Constant(NUMBER, 0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(NUMBER, lanes), [0] * lanes))
 
 
 def floats(builder: Any, pointer: Any, lanes: int = LANES) -> Any:
-    """A vector of float32 from memory."""
+    """Load a vector of float32 from memory."""
     return builder.load(builder.bitcast(pointer, ir.VectorType(ir.FloatType(), lanes).as_pointer()), align=4)
 
 
 def samples_at(context: Any, builder: Any, pointer: Any, kind: Any) -> Any:
-    """A vector of samples of any type from memory, as float32."""
+    """Load a vector of samples of any type from memory, as float32."""
     run = ir.VectorType(context.get_value_type(kind), LANES).as_pointer()
     samples = builder.load(builder.bitcast(pointer, run), align=kind.bitwidth // 8)
     if isinstance(kind, types.Integer):
@@ -91,9 +91,9 @@ def plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
 
 
 class _Masks:
-    """The weights of masks along a row of samples: their product, vector by vector.
+    """The product of the masks' weights along a row of samples, vector by vector.
 
-    A mask's weight is a spline of three lines of it that were sampled at the columns of the samples.
+    A mask's weight is a spline of three of its lines, which were sampled at the columns of the samples.
     """
 
     def __init__(self, context: Any, builder: Any, kinds: Any, masks: Any, repeat: int) -> None:
@@ -105,7 +105,7 @@ class _Masks:
         self.weights = [cgutils.alloca_once(builder, WIDE) for _ in range(self.narrow)]
 
     def along(self, entry: Any, x: Any) -> list[Any]:
-        """The weights of row ``entry`` of the list from sample value ``x`` on, a vector for each of samples."""
+        """Weights of row ``entry`` of the list from sample value ``x`` on, one vector per vector of samples."""
         builder = self.builder
         if self.repeat == 3:
             x = builder.udiv(x, constant(3))
@@ -145,17 +145,17 @@ def _rows_adder(vectors: int, repeat: int | None = None) -> Any:
     def add_rows(typing_context, values, entries, masks, x, skip, sums, line):  # type: ignore[no-untyped-def]
         """sums[line + r, x : x + RUN] += Σ shares[e, r] · values[places[e] + x : … + RUN], for r = 0 … 3.
 
-        With masks each sample counts times its weight from them; ``RUN_OF_THREES`` sample values are added where a
-        weight counts for three channels.
+        With masks, each sample is multiplied by its weight; ``RUN_OF_THREES`` sample values are added if a
+        weight applies to three channels.
 
         Args:
             typing_context: Numba's.
             values: samples of any type, flat.
             entries: `vcc.engines.footprint_tables.Entries`.
             masks: `vcc.engines.footprint_tables.EntryMasks`, or None for `add_rows`.
-            x: int64, where in the rows; a multiple of 3 where a weight counts for three channels.
-            skip: int64, how many sample values from ``x`` on are not added: a row's last run may begin before the
-                end of the one before it.
+            x: int64, offset in the rows; a multiple of 3 if a weight applies to three channels.
+            skip: int64, number of sample values from ``x`` on to leave out: the last run of a row may begin
+                before the end of the run before it.
             sums: float32 (rows, sample values).
             line: int64, the first of the four rows.
         """
@@ -176,7 +176,7 @@ def _rows_adder(vectors: int, repeat: int | None = None) -> Any:
 def _add_rows(
     context: Any, builder: Any, signature: Any, arguments: Sequence[Any], vectors: int, masks: _Masks | None
 ) -> Any:
-    """The body of `add_rows` and its kin: see there for the arguments."""
+    """The body of `add_rows` and its variants; arguments: see there."""
     values, entries, _, x, skip, sums, line = arguments
     totals = _totals(context, builder, signature, (values, entries, x), vectors, masks)
     sums, pitch = _plane(context, builder, signature.args[5], sums)
@@ -194,7 +194,7 @@ def _add_rows(
 
 
 def _plane(context: Any, builder: Any, kind: Any, array: Any) -> tuple[Any, Any]:
-    """The numbers of an array (rows, values), and how many there are in a row."""
+    """The data of an array (rows, values), and the number of values in a row."""
     made = context.make_array(kind)(context, builder, array)
     return made.data, cgutils.unpack_tuple(builder, made.shape)[1]
 
@@ -204,7 +204,7 @@ def _totals(
 ) -> list[list[Any]]:
     """Σ shares[e, r] · values[places[e] + x …] for four rows r, vector by vector.
 
-    signature: whose first two arguments are values and entries. arguments: values, entries and x.
+    signature: its first two arguments are values and entries. arguments: values, entries and x.
     """
     values, entries, x = arguments
     values = context.make_array(signature.args[0])(context, builder, values).data
@@ -243,18 +243,18 @@ def _whole_rows(vectors: int, repeat: int | None = None, apart: bool = False) ->
     def sum_whole_rows(typing_context, values, entries, masks, sums, to, length):  # type: ignore[no-untyped-def]
         """sums[r, to + x] = Σ shares[e, r] · values[places[e] + x], for r = 0 … 3 and all x of a row.
 
-        Where channels are apart, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its
-        pixels, then those of the second and the third; and each begins behind the one before it, though the values
-        of the last begin earlier, so as to end with the row.
+        If ``apart``, each run of ``RUN_OF_THREES`` values has the sums of the first channel of its pixels, then
+        those of the second and the third channel. Runs are written one after the other; the last run may be read
+        from an earlier place, so as to end with the row.
 
         Args:
             typing_context: Numba's.
             values: samples of any type, flat.
             entries: `vcc.engines.footprint_tables.Entries`.
             masks: `vcc.engines.footprint_tables.EntryMasks`, or None.
-            sums: float32 (rows, sample values), which are overwritten.
-            to: int64, where in the first of the four rows, or so far behind its beginning.
-            length: int64, values to sum, a run at least.
+            sums: float32 (rows, sample values), overwritten.
+            to: int64, offset from the beginning of the first of the four rows.
+            length: int64, number of values to sum, at least one run.
         """
         signature = types.void(values, entries, masks, sums, types.int64, types.int64)
 
@@ -282,7 +282,7 @@ def _whole_rows(vectors: int, repeat: int | None = None, apart: bool = False) ->
 
 
 def _picked(builder: Any, three: Sequence[Any], lanes: Sequence[int]) -> Any:
-    """A vector of some of the lanes of three, numbered one vector after the other."""
+    """A vector of some lanes of three vectors, numbered across them."""
     first = [lane if lane < 2 * LANES else 0 for lane in lanes]
     second = [n if lane < 2 * LANES else lane - LANES for n, lane in enumerate(lanes)]
     kind = ir.VectorType(NUMBER, LANES)
@@ -291,12 +291,12 @@ def _picked(builder: Any, three: Sequence[Any], lanes: Sequence[int]) -> Any:
 
 
 def parted(builder: Any, three: Sequence[Any]) -> list[Any]:
-    """Pixels of three channels, channel by channel."""
+    """Split pixels of three channels into one vector per channel."""
     return [_picked(builder, three, [3 * n + c for n in range(LANES)]) for c in range(3)]
 
 
 def joined(builder: Any, three: Sequence[Any]) -> list[Any]:
-    """Three channels as pixels: the inverse of what parts them."""
+    """Interleave three channels into pixels: the inverse of `parted`."""
     places = [(i % 3) * LANES + i // 3 for i in range(3 * LANES)]
     return [_picked(builder, three, places[k * LANES : (k + 1) * LANES]) for k in range(3)]
 
@@ -313,7 +313,7 @@ part_masked_whole_rows = _whole_rows(3, repeat=3, apart=True)
 
 @intrinsic
 def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
-    """Ask for the line of memory that holds ``values[place]``, which may lie anywhere: it is needed soon."""
+    """Prefetch the cache line of ``values[place]``; the place may be out of bounds."""
     signature = types.void(values, types.int64)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -321,7 +321,7 @@ def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
         byte = ir.IntType(8).as_pointer()
         kind = ir.FunctionType(ir.VoidType(), [byte, NUMBER, NUMBER, NUMBER])
         prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
-        # to be read, into the second-level cache, as data
+        # read access, second-level cache, data
         hints = [ir.Constant(NUMBER, hint) for hint in (0, 2, 1)]
         builder.call(prefetch, [builder.bitcast(builder.gep(data, [arguments[1]]), byte), *hints])
         return context.get_dummy_value()
@@ -330,7 +330,7 @@ def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
 
 
 EIGHT = 8
-"""Rows of the raster that `mix_eight` mixes at once, side by side in memory."""
+"""Number of raster rows that `mix_eight` mixes together, next to each other in memory."""
 
 
 @intrinsic

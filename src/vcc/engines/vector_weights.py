@@ -1,4 +1,4 @@
-"""Rows of sums weighed by lines of several masks at once, as vector instructions (`vcc.engines.vector_sums`)."""
+"""Weigh rows of sums by lines of several masks together, with vector instructions (`vcc.engines.vector_sums`)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numba.extending import intrinsic
 from vcc.engines.vector_sums import FLAGS, LANES, PLACE, VECTORS, WIDE, constant, everywhere, floats, joined, plus
 
 MASKS = 4
-"""Masks that sums are weighed by at once."""
+"""Number of masks that weigh sums together."""
 
 
 def _weigher(vectors: int, parted: bool) -> Any:
@@ -23,22 +23,22 @@ def _weigher(vectors: int, parted: bool) -> Any:
     def weigh_rows(typing_context, sums, pitch, count, lines, at, line, plane, out, to, step, length):  # type: ignore[no-untyped-def]
         """out[to + n · step + x] += Σ_r lines[at + n · plane + r · line + x] · sums[r · pitch + x], for all x.
 
-        For four masks n. Where three channels share a weight, x / 3 in the lines, and sums are parted as
-        `vcc.engines.vector_sums.part_whole_rows` has them.
+        For four masks n. If ``parted``, three channels share a weight: the offset in the lines is x / 3, and
+        sums are in the layout of `vcc.engines.vector_sums.part_whole_rows`.
 
         Args:
             typing_context: Numba's.
             sums: float32, flat.
-            pitch: int64, from a row of them to the next.
-            count: int64, how many rows.
+            pitch: int64, offset from a row of sums to the next.
+            count: int64, number of rows.
             lines: float32, flat.
-            at: int64, where the line of row 0 begins in them.
-            line: int64, from a line to the next.
-            plane: int64, from a mask to the next.
+            at: int64, where the line of row 0 begins.
+            line: int64, offset from a line to the next.
+            plane: int64, offset from a mask to the next.
             out: float32, flat.
             to: int64, where the first mask's values begin.
-            step: int64, from a mask to the next.
-            length: int64, values to weigh, a run at least.
+            step: int64, offset from a mask to the next.
+            length: int64, number of values to weigh, at least one run.
         """
         whole = types.int64
         signature = types.void(sums, whole, whole, lines, whole, whole, whole, out, whole, whole, whole)
@@ -67,10 +67,10 @@ def _weigher(vectors: int, parted: bool) -> Any:
 def _weighed(
     builder: Any, of_sums: Sequence[Any], of_lines: Sequence[Any], vectors: int, parted: bool
 ) -> list[list[Any]]:
-    """A run of what four masks make of sums: of each, as many vectors.
+    """One run of the weighed sums of four masks: ``vectors`` vectors for each mask.
 
-    of_sums: where they are, where the run begins, from a row to the next, and how many. of_lines: where they are,
-    where the run begins, from a line to the next, and from a mask to the next.
+    of_sums: (data, where the run begins, offset from a row to the next, number of rows). of_lines: (data, where
+    the run begins, offset from a line to the next, offset from a mask to the next).
     """
     sums, place, pitch, count = of_sums
     lines, at, line, plane = of_lines
@@ -94,7 +94,7 @@ def _weighed(
 
 
 def _add_behind(builder: Any, vectors: Sequence[Any], out: Any, begin: Any, skipped: Any) -> None:
-    """out[begin …] += vectors, but for some of the first values."""
+    """out[begin …] += vectors, except for the first ``skipped`` values."""
     skipped = everywhere(builder, skipped)
     for k, vector in enumerate(vectors):
         pointer = builder.gep(out, [builder.add(begin, constant(k * LANES))])

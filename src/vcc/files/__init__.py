@@ -1,1 +1,1 @@
-"""Bytes to arrays and cameras, and back."""
+"""Conversion between file bytes and arrays or cameras."""

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all."""
+"""Atomic writing: a file appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from vcc.files.parts import check_name, clear_leftovers, part_of
 
 @contextmanager
 def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
-    """A temporary path beside ``path`` to write to; it becomes ``path`` if all goes well.
+    """Yield a temporary path next to ``path``; rename it to ``path`` if the block succeeds.
 
     ::
 
         with atomic_path("picture.png") as temporary:
             temporary.write_bytes(data)
 
-    If the block fails, nothing is left behind and an older file of that name stays as it was. The
-    temporary file is in the same folder (a rename across disks is not atomic) and has the same
-    ending. What killed writers of the same file left is removed.
+    If the block fails, no file is left behind and an existing file of that name stays unchanged. The temporary
+    file is in the same folder (a rename across disks is not atomic) and has the same extension. Leftovers of
+    killed writers of the same file are removed.
 
     Raises:
-        InputError: the folder does not exist or cannot be written to, ``path`` is a folder, or the
-            system refuses to write (no space, no permission).
+        InputError: the folder does not exist or is not writable, ``path`` is a folder, or the system refuses to
+            write (no space, no permission).
     """
-    target = Path(os.path.realpath(path))  # a link stays a link: what it points to is replaced
+    target = Path(os.path.realpath(path))  # a symbolic link stays; its target is replaced
     _check_target(target)
     temporary = part_of(target)
     try:
@@ -46,11 +46,11 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
 
 
 def refusal(error: OSError, part: Path) -> str:
-    """Why the disk refuses to write, with the room that there is and the way out.
+    """Text for a failed write: the reason, the free space on the disk and a remedy.
 
     Args:
-        error: what was raised.
-        part: the file or folder in the making, which is still there.
+        error: the exception that was raised.
+        part: the partly written file or folder, which must still exist.
     """
     reason = error.strerror or str(error)
     if error.errno not in (errno.ENOSPC, errno.EDQUOT):
@@ -75,14 +75,14 @@ _WAYS_OUT: dict[int | None, str] = {
 
 
 def said_by_disk(words: str) -> OSError:
-    """What the disk refused, of a library that hands on its words alone."""
+    """An `OSError` from the error text of a library, with the ``errno`` that the text stands for if known."""
     known = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM)
     number = next((number for number in known if os.strerror(number) in words), None)
     return OSError(words) if number is None else OSError(number, os.strerror(number))
 
 
 def _taken(file: Path) -> int:
-    """Bytes that a file takes on the disk; what was skipped in writing takes none."""
+    """Bytes allocated on the disk; holes of sparse files do not count."""
     found = file.stat()
     return min(found.st_size, 512 * found.st_blocks) if hasattr(found, "st_blocks") else found.st_size
 

@@ -1,7 +1,7 @@
-"""What camera files hold: the classes that they write by name, and the fields of a class that they write.
+"""Classes that camera files write by name, and the fields of each class that are stored.
 
-Reading and writing go by the fields of the dataclasses, their types and their units, so that a new element,
-pattern, kernel or surface needs no code here.
+Reading and writing use the fields of the dataclasses, their types and their units, so a new element, pattern,
+kernel or surface needs no code here.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder
 from vcc.prescriptions import load_lens
 from vcc.prescriptions.model import Reference
-from vcc.shapes import height_maps, kernels, lattice, patterns, surfaces, zernike
+from vcc.shapes import directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
 from vcc.shapes.stacked_patterns import Product
@@ -33,7 +33,7 @@ from vcc.shapes.surface import Surface
 
 
 def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
-    """The classes of modules that can be made, by their names in a file: CosineSum is "cosine_sum"."""
+    """Concrete subclasses of ``base`` in the modules, by their names in a file: CosineSum is "cosine_sum"."""
     things = [(thing, module) for module in modules for thing in vars(module).values() if inspect.isclass(thing)]
     own = [kind for kind, module in things if kind.__module__.startswith(module.__name__)]
     kinds = [kind for kind in own if issubclass(kind, base) and not inspect.isabstract(kind)]
@@ -41,22 +41,22 @@ def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
 
 
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
-"""Which class each ``kind`` in a camera file stands for. Add your own to read and write them."""
+"""The class of each ``kind`` in a camera file. Add your own classes to read and write them."""
 
-PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice) | {"product": Product}
-"""Which class each ``name`` of a pattern in a camera file stands for. Add your own."""
-del PATTERN_NAMES["function_pattern"]  # Python, which no file can hold
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice, directional) | {"product": Product}
+"""The class of each pattern ``name`` in a camera file. Add your own."""
+del PATTERN_NAMES["function_pattern"]  # a Python function, which a file cannot store
 
 KERNEL_NAMES: dict[str, type[Kernel]] = _named(Kernel, kernels)
-"""Which class each ``name`` of a diffuser's kernel in a camera file stands for. Add your own."""
+"""The class of each ``name`` of a diffuser's kernel in a camera file. Add your own."""
 
 SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces, zernike, height_maps)
-"""Which class each ``name`` of a phase plate's surface in a camera file stands for. Add your own."""
+"""The class of each ``name`` of a phase plate's surface in a camera file. Add your own."""
 
 
 @dataclasses.dataclass(frozen=True)
 class _Mura:
-    """`vcc.patterns.mura` as a file writes it; its cells are an array."""
+    """`vcc.patterns.mura` as stored in a file by its prime; the cells are an array."""
 
     prime: int
 
@@ -66,14 +66,14 @@ class _Mura:
 
 @dataclasses.dataclass(frozen=True)
 class Family:
-    """Things that a file writes by name, like ``{ name = "circle", diameter = "5 mm" }``.
+    """A family of objects that a file writes by name, like ``{ name = "circle", diameter = "5 mm" }``.
 
     Args:
-        base: the class of all of them.
-        names: which class each name stands for.
-        example: of one as a file writes it.
-        way_out: what to do with a thing that has no name.
-        arrays: names that stand for an array, where a field takes arrays too.
+        base: base class of the family.
+        names: the class of each name.
+        example: an object as a file writes it.
+        way_out: remedy for an object without a name, for messages.
+        arrays: names that stand for arrays, for fields that also accept arrays.
     """
 
     base: type
@@ -84,17 +84,17 @@ class Family:
 
     @property
     def noun(self) -> str:
-        """What one of them is called: "pattern"."""
+        """The noun for an object of the family: "pattern"."""
         return self.base.__name__.lower()
 
     @property
     def module(self) -> str:
-        """Where users find them: "vcc.patterns"."""
+        """The public module of the family: "vcc.patterns"."""
         return f"vcc.{self.noun}s"
 
     @property
     def table(self) -> str:
-        """Where users add names: "PATTERN_NAMES"."""
+        """The public table to which users add names: "PATTERN_NAMES"."""
         return f"{self.noun.upper()}_NAMES"
 
 
@@ -123,7 +123,7 @@ FAMILIES = (
 
 @dataclasses.dataclass(frozen=True)
 class _LensFile:
-    """`vcc.load_lens` as a file writes it: a real lens in a file beside the camera file."""
+    """`vcc.load_lens` as stored in a camera file: a real lens in a separate lens file."""
 
     lens_file: str
     stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
@@ -147,29 +147,29 @@ class _LensFile:
 
     @classmethod
     def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
-        """The form that gives an equal lens; None if it came from no file, or that is gone or gives another."""
+        """The form that reads as an equal lens; None if the lens has no file, or its file is gone or differs."""
         rims = lens.exit_diameter is not None
         for stop, z_of in itertools.product((None, lens.stop_diameter), get_args(Reference)):
             form = cls(lens.source, stop, rims=rims, z_of=z_of, z=lens.z, decentre=lens.decentre, name=lens.name)
             try:
-                with warnings.catch_warnings():  # of a wide stop, which was said when it was read
+                with warnings.catch_warnings():  # a wide stop was warned about on first reading
                     warnings.simplefilter("ignore")
                     if lens.source and form.made(folder) == lens:
                         return form
-            except (InputError, OSError):  # no such file, or a source that is no file's name at all
+            except (InputError, OSError):  # no such file, or a source that is not a file name
                 continue
         return None
 
 
 FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile}
-"""Elements that another file than an array's can describe: the form to read when its first field is given."""
+"""Elements that a separate lens file can describe: the form to read if its first field is given."""
 
 
 # --- fields and names ---
 
 
 def parameters_of(kind: type) -> dict[str, dataclasses.Field[Any]]:
-    """The fields that a file holds: parameters, not remarks that do not count in a comparison."""
+    """The fields stored in a file: the init fields that take part in comparison."""
     return {field.name: field for field in dataclasses.fields(kind) if field.init and field.compare}
 
 
@@ -185,12 +185,12 @@ def unit_of(field: dataclasses.Field[Any]) -> str | None:
 
 
 def alternatives(hint: Any) -> tuple[Any, ...]:
-    """The types of which a hint allows one."""
+    """The types of a union; a single type as a tuple of one."""
     return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
 
 
 def family_of(choices: tuple[Any, ...]) -> Family | None:
-    """The family that a field takes things of, by the types that it takes."""
+    """The family of the objects that a field accepts, from its types; None if there is none."""
     classes = [choice for choice in choices if inspect.isclass(choice)]
     return next((each for each in FAMILIES if any(issubclass(one, each.base) for one in classes)), None)
 

@@ -1,4 +1,4 @@
-"""Camera files read: an optical train from TOML, and what is wrong with one that cannot be had."""
+"""Reading camera files: an optical train from TOML, with error messages for faulty files."""
 
 from __future__ import annotations
 
@@ -44,27 +44,27 @@ from vcc.optics.train import Train
 from vcc.shapes.patterns import Pattern
 
 LIKELY = 0.75
-"""How alike a name must be to a known one to be a slip of it: "lense" for "lens", but not "stop" for "prism"."""
+"""Similarity above which an unknown name counts as a typing error: "lense" for "lens", not "stop" for "prism"."""
 
 MOVING = "moving"
-"""The table of a camera file that says what changes over time; see `vcc.motion.moving_file`."""
+"""The table of a camera file that describes changes over time; see `vcc.motion.moving_file`."""
 DEEPEST = 30
-"""How deep tables and lists of a camera may stand in one another; NumPy has arrays of up to 32 axes."""
+"""Maximum nesting of tables and lists in a camera; NumPy arrays have up to 32 axes."""
 LARGEST = float(np.finfo(np.float32).max)
-"""Of numbers in a camera file: light is computed with in float32."""
+"""Largest number in a camera file: computations on light use float32."""
 
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Beside(Brief):
-    """The files that a camera's tables may name.
+    """The files that the tables of a camera may name.
 
     Args:
-        folder: where they are found.
-        only: the names that may be opened; None opens any.
-        arrays: what is read already, by the names under which tables have it: as .npy files hold it.
-        opened: names that were opened, noted here.
+        folder: the folder of these files.
+        only: names that may be opened; None allows all.
+        arrays: arrays that are already in memory, by the names that tables use, in the form of .npy files.
+        opened: collects the names that were opened.
     """
 
     folder: Path
@@ -73,10 +73,10 @@ class Beside(Brief):
     opened: set[str] = dataclasses.field(default_factory=set)
 
     def path(self, name: str) -> Path:
-        """Where the file of a name stands.
+        """Path of a file name.
 
         Raises:
-            InputError: it is none that may be opened.
+            InputError: the file may not be opened.
         """
         if self.only is not None and name not in self.only:
             known = sorted(self.only | set(self.arrays))
@@ -88,7 +88,7 @@ class Beside(Brief):
         return self.folder / expanded(name)
 
     def exists(self, name: str) -> bool:
-        """Whether there is such a file; False of those that may not be opened."""
+        """Whether the file exists; False if it may not be opened."""
         if name in self.arrays:
             return True
         return (self.only is None or name in self.only) and (self.folder / name).exists()
@@ -96,11 +96,11 @@ class Beside(Brief):
 
 @dataclasses.dataclass(frozen=True)
 class TrainAsWritten:
-    """What tables describe.
+    """The optical train that tables describe.
 
     Args:
         elements: in the order of the tables.
-        train: of them.
+        train: the train of these elements.
     """
 
     elements: tuple[Element, ...]
@@ -118,7 +118,7 @@ def read_train(path: str | PathLike[str]) -> Train:
 
 
 def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
-    """The tables of a camera file as they stand there, not looked at any further.
+    """Return the tables of a camera file without checking their content.
 
     Raises:
         InputError: no such file, or not TOML.
@@ -129,7 +129,7 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def tables_of_text(text: str, called: str = "the camera") -> dict[str, Any]:
-    """The tables of a camera file whose text is given.
+    """Return the tables of a camera file from its text.
 
     Raises:
         InputError: not TOML.
@@ -144,17 +144,17 @@ def train_of_tables(
     name: str = "",
     others: Collection[str] = (),
 ) -> TrainAsWritten:
-    """The optical train that tables describe: those of a camera file, or the same from elsewhere.
+    """The optical train that tables describe; the tables need not come from a file.
 
     Args:
-        tables: ``elements`` and ``sensor``; only text, numbers, truth values, lists and tables of such.
-        beside: the files that they may name.
-        called: what a message calls the whole.
+        tables: ``elements`` and ``sensor``; only text, numbers, booleans, lists and tables of these.
+        beside: the files that the tables may name.
+        called: name of the camera in messages.
         name: of the train.
-        others: names of tables that may be there besides, and are not looked at any further.
+        others: names of further tables to ignore.
 
     Raises:
-        InputError: as `vcc.camera_file.load_camera`; a file that may not be opened.
+        InputError: as in `vcc.camera_file.load_camera`, or a file that may not be opened.
     """
     try:
         _check_values(tables, called, DEEPEST)
@@ -164,7 +164,7 @@ def train_of_tables(
 
 
 def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int) -> None:
-    """Refuse what no camera has: numbers that overflow as soon as one computes with them, lists without an end."""
+    """Raise for values that no camera has: numbers that overflow in computation, lists nested too deeply."""
     if not levels:
         raise InputError(
             f"{place[:LONGEST_SHOWN]}… is made of lists in lists: a camera's stand in up to {DEEPEST} others"
@@ -178,17 +178,17 @@ def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int)
 
 
 def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -> Any:
-    """What a dataclass takes in a field, of what a camera file has there.
+    """The value of a dataclass field from its value in a camera file.
 
     Args:
-        kind: the class: of an element, the sensor, a pattern.
-        name: of the field.
-        given: text, a number, a truth value, a list or a table of such.
-        called: what a message calls it.
-        beside: the files that it may name.
+        kind: class of the element, sensor or pattern.
+        name: name of the field.
+        given: text, a number, a boolean, a list or a table of these.
+        called: name of the field in messages.
+        beside: the files that the value may name.
 
     Raises:
-        InputError: what `read_train` refuses there.
+        InputError: as in `read_train`.
     """
     try:
         return _read_value(given, get_type_hints(kind)[name], unit_of(parameters_of(kind)[name]), called, beside)
@@ -220,7 +220,7 @@ def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str)
 
 
 def _focus(given: dict[str, Any], place: str) -> float | None:
-    """The distance to focus on, taken out of a sensor's fields, and a place put there; None where z is given."""
+    """Remove the focus distance from a sensor's fields, set z to 0 and return the distance; None if z is given."""
     if "focus" not in given:
         if "z" not in given:
             raise InputError(
@@ -247,7 +247,7 @@ def _read_toml(file: Path) -> dict[str, Any]:
 def _parsed(content: str, called: str) -> dict[str, Any]:
     try:
         return tomllib.loads(content)
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits
+    except (ValueError, RecursionError) as error:  # also raised for numbers with thousands of digits
         reason = in_words(error) if isinstance(error, RecursionError) else error
         raise InputError(f"{called} is not valid TOML: {reason}") from None
 
@@ -271,7 +271,7 @@ def _read_element(entry: Mapping[str, Any], number: int, called: str, beside: Be
 
 
 def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
-    """Whether a file describes the element, rather than its fields; it cannot be both or neither."""
+    """Whether a file describes the element instead of its fields; raises if both or neither are given."""
     form, fields = FROM_FILES[kind], parameters_of(kind)
     key = first_field(form)
     if key not in given:
@@ -286,15 +286,15 @@ def _comes_from_file(kind: type, given: Mapping[str, Any], place: str) -> bool:
 
 
 def known_choice(name: object, choices: Mapping[str, Any], what: str) -> Any:
-    """The choice of that name, in which capitals, spaces, "-" and "_" do not matter.
+    """The choice of that name; capitals, spaces, "-" and "_" are ignored.
 
     Args:
-        name: as the file has it.
-        choices: by the names that there are.
-        what: is to be chosen, for messages.
+        name: the name in the file.
+        choices: the choices by name.
+        what: noun for messages.
 
     Raises:
-        InputError: no text, or no such name; what may have been meant, or all that there is, is said.
+        InputError: not text, or an unknown name; the message suggests a similar name or lists all.
     """
     if not isinstance(name, str):
         raise InputError(f"{what} is {in_toml(name)}: write it as text, one of {listed(choices)}")
@@ -309,7 +309,7 @@ def _plain(name: str) -> str:
 
 
 def _nearest(name: str, choices: Iterable[str]) -> str:
-    """What may have been meant where that is likely, a slip of the keys; else all that there is."""
+    """A suggestion if a similar name exists, else a list of all names."""
     close = difflib.get_close_matches(name.lower(), list(choices), n=1, cutoff=LIKELY)
     if close:
         return f': did you mean "{close[0]}"?'
@@ -319,17 +319,17 @@ def _nearest(name: str, choices: Iterable[str]) -> str:
 def check_keys(
     given: Mapping[str, Any], known: Iterable[str], required: Iterable[str], place: str, noun: str
 ) -> None:
-    """Refuse what is not known, then what is missing.
+    """Raise for unknown keys, then for missing ones.
 
     Args:
         given: a table.
-        known: keys that it may have.
-        required: those that it must have.
-        place: where it stands, for messages.
-        noun: what a key of it is called, such as "field".
+        known: allowed keys.
+        required: keys that must be present.
+        place: location of the table, for messages.
+        noun: noun for a key, such as "field".
 
     Raises:
-        InputError: there is such.
+        InputError: a key is unknown or missing.
     """
     known = list(known)
     for key in given:
@@ -341,7 +341,7 @@ def check_keys(
 
 
 def _build(kind: type, given: Mapping[str, Any], place: str, beside: Beside) -> Any:
-    """An object of a dataclass from the fields of a table."""
+    """Build an object of a dataclass from the fields of a table."""
     fields = parameters_of(kind)
     check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
     hints = get_type_hints(kind)
@@ -361,7 +361,7 @@ def _takes_arrays(choices: tuple[Any, ...]) -> bool:
 
 
 def _read_value(given: Any, hint: Any, unit: str | None, what: str, beside: Beside) -> Any:
-    """A value of a file as the type that a field wants."""
+    """Convert a value of a file to the type of the field."""
     choices = alternatives(hint)
     family, arrays = family_of(choices), _takes_arrays(choices)
     items = next((get_args(choice) for choice in choices if get_origin(choice) is tuple), None)
@@ -391,7 +391,7 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, beside: Besi
 
 
 def _check_no_name(given: Any, family: Family | None, what: str, beside: Beside) -> None:
-    """Refuse the name of a pattern where text is that of a file."""
+    """Raise if the name of a pattern is given as text, which stands for a file."""
     if family is None or not isinstance(given, str) or beside.exists(given):
         return
     if given in {**family.names, **family.arrays}:
@@ -411,7 +411,7 @@ def _checked_table(given: Any, what: str) -> Mapping[str, Any]:
 
 
 def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, beside: Beside) -> tuple[Any, ...]:
-    """A list of so many entries, or of any number where the hints are ``(float, ...)``."""
+    """A list of fixed length, or of any length if the hints are ``(float, ...)``."""
     if len(hints) == 2 and hints[1] is Ellipsis:
         wanted, fits = "", isinstance(given, list)
         family = family_of(alternatives(hints[0]))
@@ -439,7 +439,7 @@ def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, 
 
 
 def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
-    """Numbers, text and truth values, which TOML keeps apart."""
+    """Check a number, text or boolean; TOML distinguishes these types."""
     if type(given) in choices:
         return given
     if type(given) is int and float in choices:
@@ -450,7 +450,7 @@ def _read_plain(given: Any, choices: tuple[Any, ...], what: str) -> Any:
 
 
 def _read_named(given: Any, family: Family, arrays: bool, what: str, beside: Beside) -> Any:
-    """A thing by name; where a field takes arrays, also a name that stands for one."""
+    """An object by name; if the field accepts arrays, also a name that stands for an array."""
     if not isinstance(given, dict):
         raise InputError(f"{what} is {in_toml(given)}: write a {family.noun} by name, like {family.example}")
     extra = family.arrays if arrays else {}
@@ -471,7 +471,7 @@ def _read_affine(given: Any, what: str, beside: Beside) -> Affine:
 
 
 def read_array(given: Any, unit: str | None, transmission: bool, what: str, beside: Beside) -> NDArray[np.float64]:
-    """Numbers from a file beside the camera file, or rows of them; where they have a unit, each with its own."""
+    """An array from a file next to the camera file, or from nested lists; numbers with a unit carry it each."""
     if isinstance(given, str):
         if given in beside.arrays:
             return beside.arrays[given]
@@ -503,9 +503,9 @@ def _with_units(given: Any, unit: str, what: str) -> Any:
 def _read_array_file(
     file: Path, name: str, unit: str | None, transmission: bool, what: str
 ) -> NDArray[np.float64]:
-    """Numbers as float64: .npy and .csv as they are, in SI; pictures as a share of their full scale.
+    """Numbers as float64: .npy and .csv unchanged, in SI units; pictures as a fraction of full scale.
 
-    Where they are transmissions, whole numbers in a .npy are a share of their full scale too, as in a picture.
+    For transmissions, integers in a .npy file are a fraction of full scale too, as in a picture.
     """
     if not os.path.lexists(file):
         raise InputError(f'{what}: there is no file "{name}" in {file.parent}')

@@ -1,4 +1,4 @@
-"""Camera files written: an optical train as TOML, so that reading returns an equal one."""
+"""Writing camera files: an optical train as TOML that reads back as an equal train."""
 
 from __future__ import annotations
 
@@ -43,25 +43,25 @@ from vcc.shapes.patterns import Cells, Pattern
 
 
 def write_train(train: Train, path: str | PathLike[str]) -> None:
-    """Write an optical train as TOML that reads as an equal one; see `vcc.camera_file.save_camera`."""
+    """Write an optical train as TOML that reads back as an equal train; see `vcc.camera_file.save_camera`."""
     file = expanded(path)
     write_tables(file, *tables_of_train(train, file))
 
 
 def write_tables(file: Path, tables: Mapping[str, Any], arrays: Mapping[str, NDArray[np.float64]]) -> None:
-    """Write a camera file and the arrays that it names, each whole or not at all.
+    """Write a camera file and the arrays that it names; each file is written atomically.
 
     Args:
-        file: the camera file; an older one of that name is replaced.
-        tables: what it says.
-        arrays: by the names of their files.
+        file: path of the camera file; an existing file is replaced.
+        tables: content of the camera file.
+        arrays: arrays by file name.
 
     Raises:
-        InputError: a folder that cannot be written to.
+        InputError: the folder is not writable.
     """
     import tomli_w
 
-    for name, values in arrays.items():  # first, so that the camera file never names a missing one
+    for name, values in arrays.items():  # arrays first, so that the camera file never names a missing file
         with atomic_path(file.parent / name) as temporary, temporary.open("wb") as stream:
             write_npy(values, stream)
     with atomic_path(file) as temporary:
@@ -69,18 +69,18 @@ def write_tables(file: Path, tables: Mapping[str, Any], arrays: Mapping[str, NDA
 
 
 NOWHERE = Path(tempfile.gettempdir()) / "no-such-folder"
-"""Where a camera stands that comes from no file: no file beside it is read or named."""
+"""Path used for a camera without a file: no neighbouring file is read or named."""
 
 
 def tables_of_train(train: Train, file: Path) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-    """The tables of a camera file that describe an optical train, and the arrays that they name.
+    """Return the tables of a camera file for an optical train, and the arrays that the tables name.
 
     Args:
-        train: what to write.
-        file: the camera file: arrays are named after it, and files beside it that hold the same are named instead.
+        train: the train to write.
+        file: path of the camera file; arrays are named after it, and existing files with equal arrays are reused.
 
     Raises:
-        InputError: what a file cannot hold.
+        InputError: the train contains an object that a file cannot store.
     """
     arrays: dict[str, NDArray[np.float64]] = {}
     tables = {
@@ -112,13 +112,13 @@ def _write_element(
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Writer(Brief):
-    """Turns one object into a table; arrays are put aside, to be written as files of their own.
+    """Converts one object to a table; arrays are collected, to be written to separate files.
 
     Args:
-        file: the camera file.
-        label: what messages call the object.
-        slug: what files of its arrays are named after, beside the camera file.
-        arrays: by the names of their files; more come to them.
+        file: path of the camera file.
+        label: name of the object in messages.
+        slug: part of the file names of its arrays.
+        arrays: arrays by file name; the writer adds to it.
     """
 
     file: Path
@@ -127,7 +127,7 @@ class Writer(Brief):
     arrays: dict[str, NDArray[np.float64]]
 
     def table_of(self, thing: Any) -> dict[str, Any]:
-        """The fields that differ from their defaults."""
+        """Table of the fields that differ from their defaults."""
         table, hints = {}, get_type_hints(type(thing))
         for name, field in parameters_of(type(thing)).items():
             value = getattr(thing, name)
@@ -141,10 +141,10 @@ class Writer(Brief):
         return table
 
     def field(self, holder: Any, name: str, value: Any) -> Any:
-        """What a file has where a field of a dataclass is to take a value: `read_field` reads it.
+        """The file's form of a value for a field of a dataclass; `read_field` reads it.
 
         Raises:
-            InputError: what a file cannot hold.
+            InputError: a file cannot store the value.
         """
         family = family_of(alternatives(get_type_hints(type(holder))[name]))
         self.check_writable(value, family)
@@ -153,15 +153,15 @@ class Writer(Brief):
         return self.value(value, unit_of(parameters_of(type(holder))[name]), name)
 
     def value(self, value: Any, unit: str | None, name: str) -> Any:
-        """What a file has for a value of a field.
+        """The file's form of a field value.
 
         Args:
-            value: of any type that files hold.
-            unit: its dimension, or None.
-            name: of the field.
+            value: a value of any type that files store.
+            unit: dimension of the value, or None.
+            name: name of the field.
 
         Raises:
-            InputError: what a file cannot hold.
+            InputError: a file cannot store the value.
         """
         if isinstance(value, tuple | list):
             return [self.value(part, unit, name) for part in value]
@@ -188,8 +188,8 @@ class Writer(Brief):
         )
 
     def array(self, values: NDArray[np.float64], field: str = "") -> str:
-        """The name of the file that will hold an array."""
-        # All arrays have values: that name would say nothing.
+        """Register an array and return the name of its file."""
+        # "values" is the field of every array, so it is left out of the name.
         stem = f"{stem_and_ending(self.file)[0]}_{self.slug}" + (
             f"_{field}" if field not in ("", "values") else ""
         )
@@ -201,13 +201,13 @@ class Writer(Brief):
         return name
 
     def named(self, thing: Any, family: Family) -> dict[str, Any]:
-        """A thing of a family by its name."""
+        """Table of a family's object: its name and parameters."""
         self.check_writable(thing, family)
         name = next(name for name, kind in family.names.items() if type(thing) is kind)
         return {"name": name, **self.table_of(thing)}
 
     def check_writable(self, thing: Any, family: Family | None) -> None:
-        """Refuse what takes the place of a thing with a name and has none: Python functions, own classes."""
+        """Raise for an object without a name in its family: Python functions, unregistered classes."""
         if (
             family is None
             or type(thing) in family.names.values()
@@ -229,7 +229,7 @@ class Writer(Brief):
         raise InputError(f"the {family.noun} of {self.label} is {said} or sample it on a grid: {family.way_out}")
 
     def plain_array(self, values: NDArray[np.float64], source: str) -> Any:
-        """The file that it came from if that is within reach, a MURA by name, else a new file."""
+        """The source file if it holds the same array, a table for a MURA, else the name of a new file."""
         if source and self.holds(source, values):
             return source
         size = len(values)
@@ -238,7 +238,7 @@ class Writer(Brief):
         return self.array(values)
 
     def holds(self, source: str, values: NDArray[np.float64]) -> bool:
-        """Whether the file of a name holds these numbers already."""
+        """Whether the file ``source`` already holds these values."""
         try:
             return np.array_equal(read_array(source, None, True, "", Beside(self.file.parent)), values)
         except InputError:
@@ -252,13 +252,13 @@ def _in_words(value: Any) -> str:
 
 
 def _is_plain_array(cells: Cells, owner: Any) -> bool:
-    """Whether an element makes just these cells of an array and its own width and height."""
+    """Whether the cells equal those that the owner makes from an array and its own width and height."""
     width = getattr(owner, "width", None)
     return width is not None and cells == Cells(cells.values, width, owner.height)
 
 
 def _is_mura(values: NDArray[np.float64]) -> bool:
-    if not math.isclose(values.mean(), 0.5, abs_tol=0.1):  # half of its cells are open
+    if not math.isclose(values.mean(), 0.5, abs_tol=0.1):  # half of the cells of a MURA are open
         return False
     try:
         return np.array_equal(values, patterns.mura(len(values)))

@@ -1,9 +1,9 @@
-"""How much a file may claim to hold: a few bytes must not unfold into all of the memory.
+"""Limits on the size that a file declares, against decompression bombs.
 
-Some packings have no bound of their own (a run of zeros, a frame of a video that repeats the last one), and those
-that have one, like deflate's 1032 bytes for one, leave room for bombs. So what a file's header claims is held
-against the bytes that there are, before anything is unpacked. What pictures and light fields hold in earnest is
-far below: photographs have less than 50 bytes for one, the plainest of rendered views some hundred.
+Some compressions have no bound (a run of zeros, a video frame that repeats the last one), and a bound like
+deflate's 1032:1 is still too high. The size that a header declares is compared with the size of the file before
+anything is decompressed. Real files stay far below the limit: photographs decompress to less than 50 times
+their size, the simplest rendered views to some hundred times.
 """
 
 from __future__ import annotations
@@ -11,26 +11,26 @@ from __future__ import annotations
 from vcc.base.errors import InputError
 
 SMALL_FILE = 2**20
-"""Bytes up to which what a file may unpack to is no matter of its size."""
+"""Bytes; files up to this size may decompress to a fixed limit, whatever their size."""
 PICTURE = 2**26
-"""Bytes of samples that a picture in a small file may have: 8192×8192 grey pixels."""
+"""Bytes of samples allowed for a picture in a small file: 8192×8192 grey pixels."""
 LIGHT_FIELD = 2**27
-"""Bytes of samples that a light field in small files may have; as float32, colours take up to four times that."""
+"""Bytes of samples allowed for a light field in small files; as float32, colours take up to four times as much."""
 TIMES_PACKED = 256
-"""How many times its own bytes a larger file may unpack to."""
+"""Limit of the expansion of a larger file: decompressed bytes over stored bytes."""
 
 
 def check_declared_size(claimed: int, stored: int, what: str, most: int = PICTURE) -> None:
-    """Refuse a file that claims more than its bytes may hold.
+    """Raise if a file declares more samples than its size allows.
 
     Args:
-        claimed: bytes of all samples, unpacked.
+        claimed: bytes of all samples, decompressed.
         stored: bytes of the file or files.
-        what: claims them, for the message.
-        most: bytes to which a small file may unpack, `PICTURE` or `LIGHT_FIELD`.
+        what: name of the file in the message.
+        most: bytes to which a small file may decompress, `PICTURE` or `LIGHT_FIELD`.
 
     Raises:
-        InputError: it claims more.
+        InputError: the declared size is too large.
     """
     allowed = most if stored <= SMALL_FILE else max(most, TIMES_PACKED * stored)
     if claimed > allowed:

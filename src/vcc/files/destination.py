@@ -1,4 +1,4 @@
-"""Where a file goes: to a path, whose ending says its format, or into a buffer, of which it is said."""
+"""Output targets: a path, whose extension gives the format, or a buffer with an explicit format."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from vcc.base.errors import InputError
 from vcc.files.atomic import atomic_path
 
 Target = str | PathLike[str] | IO[bytes]
-"""A path, or what bytes can be written to, such as ``io.BytesIO()`` or a file opened with "wb"."""
+"""A path, or a binary stream such as ``io.BytesIO()`` or a file opened with "wb"."""
 
 
 @dataclass(frozen=True)
 class Destination:
-    """Where a file goes, and in which format.
+    """An output target and its format.
 
     Args:
-        ending: of the format, such as ".png".
-        path: of the file; None for a buffer.
-        buffer: what is written to; None for a path.
+        ending: extension of the format, such as ".png".
+        path: path of the file; None for a buffer.
+        buffer: the stream to write to; None for a path.
     """
 
     ending: str
@@ -35,17 +35,17 @@ class Destination:
 
     @classmethod
     def of(cls, what: str, target: Target, format: str | None, endings: tuple[str, ...]) -> Destination:
-        """That of a picture, from what a user gave.
+        """Make a destination from the arguments of a user.
 
         Args:
-            what: is written there, for the errors, such as "a picture".
+            what: noun for messages, such as "a picture".
             target: a path or a buffer.
-            format: of a buffer, such as "png"; a path says it itself.
-            endings: of all formats that there are.
+            format: format of a buffer, such as "png"; for a path, the extension gives the format.
+            endings: extensions of all supported formats.
 
         Raises:
-            InputError: neither a path nor a buffer of bytes, another format than these, a buffer without one, or a
-                path that ends otherwise.
+            InputError: neither a path nor a binary buffer, an unsupported format, a buffer without a format, or
+                a path with a different extension.
         """
         asked = None if format is None else f".{format.lower().lstrip('.')}"
         if isinstance(target, str | PathLike):
@@ -75,15 +75,15 @@ class Destination:
 
     @property
     def words(self) -> str:
-        """For a line that says what was written."""
+        """Text for a report on the file."""
         return f"{self.ending[1:]} in a buffer" if self.path is None else str(self.path)
 
     @contextmanager
     def opened(self) -> Iterator[Path]:
-        """A temporary path to write to; what stands there goes where it belongs if all goes well, else nothing.
+        """Yield a temporary path; its content goes to the destination if the block succeeds, else it is dropped.
 
         Raises:
-            InputError: what `vcc.files.atomic.atomic_path` refuses.
+            InputError: as in `vcc.files.atomic.atomic_path`.
         """
         if self.path is not None:
             with atomic_path(self.path) as temporary:

@@ -1,9 +1,9 @@
-"""What the numbers of a picture file mean, as the file says it of itself.
+"""Metadata in picture files: the meaning of the stored numbers.
 
-Each picture that is written here holds one JSON object: a TIFF in its description, a PNG in a text chunk
-"Description", an OpenEXR file in its comments, a .npy behind its array (NumPy reads arrays from a file one by one,
-so whoever reads the first does not notice). There is no second file that could be lost or belong to other numbers;
-a checksum tells where another program has changed the numbers and kept the words.
+Each written picture contains one JSON object: a TIFF in its description, a PNG in a text chunk "Description",
+an OpenEXR file in its comments, a .npy behind its array (NumPy reads the arrays of a file one by one, so a
+reader of the first is not affected). No second file can be lost or mixed up. A checksum detects programs that
+change the numbers and keep the metadata.
 """
 
 from __future__ import annotations
@@ -29,26 +29,27 @@ from vcc.files import npy
 from vcc.optics.train import Train
 
 KEY: Final = "vcc_picture"
-"""What a statement begins with; its value is the version of this form."""
+"""First key of the metadata; its value is the version of the format."""
 _VERSION: Final = 1
 LONGEST: Final = 65536
-"""Characters of a statement; a longer text is none of ours."""
+"""Maximum number of characters; longer texts are not metadata of this package."""
 
 Quantity = Literal["irradiance", "radiance", "light", "digital numbers"]
-"""What is stated: irradiance on a sensor (radiance × steradian), radiance of views, either of them where nobody
-said which, or what a sensor's electronics gave."""
+"""The stored quantity: irradiance on a sensor (radiance × steradian), radiance of views, "light" (one of the
+two, unspecified), or the digital numbers of a sensor.
+"""
 Transfer = Literal["srgb", "linear"]
 
 
 @dataclass(frozen=True)
 class CameraMark:
-    """Which camera made a picture.
+    """The camera that made a picture.
 
     Args:
-        name: that of its camera file, without ending; empty where it came from none.
-        hash: of its elements and sensor, equal for equal cameras; None where something in it tells nothing of its
-            content, as a Python function does.
-        untold: what that is; empty if there is a hash.
+        name: name of the camera file without extension; empty if the camera has no file.
+        hash: hash of elements and sensor, equal for equal cameras; None if a part cannot be hashed by content,
+            such as a Python function.
+        untold: reason for a missing hash; empty if there is a hash.
     """
 
     name: str
@@ -57,7 +58,7 @@ class CameraMark:
 
     @classmethod
     def of(cls, camera: Train) -> CameraMark:
-        """That of a camera."""
+        """The mark of a camera."""
         try:
             return cls(camera.name, fingerprint(camera.elements, camera.sensor))
         except Unhashable as why:
@@ -69,19 +70,19 @@ class CameraMark:
 
 @dataclass(frozen=True)
 class RawNumbers:
-    """What a sensor's digital numbers stand for: irradiance = (number − dark level) / numbers per irradiance.
+    """Parameters of a raw recording: irradiance = (number − dark level) / numbers per irradiance.
 
     Args:
         exposure_seconds: exposure time.
-        gain_dn_per_electron: of the electronics.
-        black_level_dn: the number of no electrons.
-        dark_level_dn: the mean number without light: black level and dark current.
-        dn_per_irradiance: numbers for an irradiance of 1, in the unit of `vcc.Camera.capture`, in each channel.
+        gain_dn_per_electron: gain of the electronics.
+        black_level_dn: the number for zero electrons.
+        dark_level_dn: the mean number without light: black level plus dark current.
+        dn_per_irradiance: numbers per unit of irradiance, in the unit of `vcc.Camera.capture`, for each channel.
         bit_depth: bits of a number.
-        full_well_electrons: the most electrons of a pixel.
-        color_filter: the tile of filters as the picture lies on the sensor; None without.
-        radiance_of_1_in_w_per_m2_sr: what a light field's value of 1 stood for.
-        seed: of the noise.
+        full_well_electrons: electrons at which a pixel saturates.
+        color_filter: tile of the colour filters in the orientation of the stored picture; None without filters.
+        radiance_of_1_in_w_per_m2_sr: radiance of a light field value of 1.
+        seed: seed of the noise.
     """
 
     exposure_seconds: float
@@ -96,7 +97,7 @@ class RawNumbers:
     seed: int
 
     def unlike(self, other: RawNumbers) -> str | None:
-        """The name of the first field in which two differ, but for rounding; None where they are alike."""
+        """The name of the first field that differs by more than rounding; None if all agree."""
         for name, value in vars(self).items():
             own, its = (np.atleast_1d(each) for each in (value, getattr(other, name)))
             numbers = own.dtype.kind in "if" and its.dtype.kind in "if" and own.shape == its.shape
@@ -107,20 +108,20 @@ class RawNumbers:
 
 @dataclass(frozen=True)
 class ImageMetadata:
-    """What the numbers of a picture file mean.
+    """The meaning of the numbers of a picture file.
 
     Args:
-        quantity: what is stated. Of anything but digital numbers: decoded number / full scale / exposure.
-        upright: whether people see it upright; else it lies as light lands on the sensor, turned by 180°.
-        transfer: how numbers stand for light: coded as sRGB, or proportional to it.
-        exposure: the factor on the quantity before it was written.
-        automatic: whether that was chosen by the picture itself.
-        clipped: the share of the pixels, 0 to 1, too bright for the file (or saturated); None if nobody counted.
-        full_scale: the number that stands for quantity × exposure = 1.
-        frame: from (column, row, 1) of the file to (x, y, 1), metres; None where not known.
-        camera: what made it; None where not known.
-        recording: of digital numbers.
-        checksum: CRC-32 of the numbers; None before they are written.
+        quantity: the stored quantity. Except for digital numbers: decoded number / full scale / exposure.
+        upright: whether the picture is upright; else it is stored as on the sensor, rotated by 180°.
+        transfer: encoding of the numbers: sRGB, or linear.
+        exposure: the factor applied to the quantity before writing.
+        automatic: whether the exposure was chosen automatically.
+        clipped: fraction of the pixels, 0 to 1, that were clipped or saturated; None if not counted.
+        full_scale: the number for quantity × exposure = 1.
+        frame: affine map from (column, row, 1) of the file to (x, y, 1) in metres; None if unknown.
+        camera: the camera that made the picture; None if unknown.
+        recording: parameters of digital numbers; None for other quantities.
+        checksum: CRC-32 of the numbers; None before writing.
     """
 
     quantity: Quantity = "light"
@@ -137,12 +138,12 @@ class ImageMetadata:
 
     @property
     def is_neutral(self) -> bool:
-        """Whether the numbers are what every reader takes a picture of views for: upright and not exposed."""
+        """Whether the numbers follow the usual convention of views: upright, exposure 1, not raw."""
         return self.upright and self.exposure == 1 and self.recording is None
 
     @property
     def pitch(self) -> tuple[float, float] | None:
-        """Distance between pixels, (rows, columns), metres, where it is known."""
+        """Distance between pixels, (rows, columns), metres; None if unknown."""
         if self.frame is None:
             return None
         across, down = np.linalg.norm(self.frame.linear, axis=0)
@@ -150,18 +151,18 @@ class ImageMetadata:
 
     @property
     def in_words(self) -> str:
-        """For people, in a few words."""
+        """Short text for people."""
         lies = "upright" if self.upright else "upside down as it lies on the sensor"
         coded = "sRGB" if self.transfer == "srgb" else "linear"
         exposed = "" if self.exposure == 1 else f", exposure {self.exposure:.6g}"
         return f"{self.quantity}, {coded}, {lies}{exposed}"
 
     def fits(self, samples: NDArray[Any]) -> bool:
-        """Whether these are the numbers that it was written for."""
+        """Whether the metadata belong to these numbers (equal checksum)."""
         return self.checksum == checksum(samples)
 
     def text(self, samples: NDArray[Any]) -> str:
-        """As JSON, for these numbers."""
+        """The metadata as JSON, with the checksum of these numbers."""
         said: dict[str, Any] = {
             KEY: _VERSION,
             "quantity": self.quantity,
@@ -182,7 +183,7 @@ class ImageMetadata:
 
 
 def checksum(samples: NDArray[Any]) -> int:
-    """CRC-32 of numbers, in the order of rows, columns, channels."""
+    """CRC-32 of the samples in the order rows, columns, channels."""
     plain = np.ascontiguousarray(samples)
     if plain.dtype.byteorder == ">":
         plain = plain.astype(plain.dtype.newbyteorder("<"))
@@ -190,10 +191,10 @@ def checksum(samples: NDArray[Any]) -> int:
 
 
 def parsed(text: str) -> ImageMetadata | None:
-    """The statement in a file's description; None where that is no statement of ours.
+    """Parse the metadata in a file's description; None if the text is not metadata of this package.
 
     Raises:
-        InputError: a statement that is damaged, or of a newer version.
+        InputError: damaged metadata, or a newer version.
     """
     if f'"{KEY}"' not in text:
         return None
@@ -279,10 +280,10 @@ def _recording(said: dict[str, Any]) -> RawNumbers:
 
 
 def metadata_of(path: Path) -> ImageMetadata | None:
-    """What a picture file says of its numbers, which are not read; None where it says nothing.
+    """Read the metadata of a picture file without its samples; None if there are none.
 
     Raises:
-        InputError: no such file, or a damaged statement. A damaged picture is left to those who read its numbers.
+        InputError: no such file, or damaged metadata. A damaged picture is reported when its samples are read.
     """
     ending = path.suffix.lower()
     if ending not in _TEXTS:
@@ -290,7 +291,7 @@ def metadata_of(path: Path) -> ImageMetadata | None:
     check_file(path, "picture file")
     try:
         text = _TEXTS[ending](path)
-    except Exception:  # each library has its own types for a damaged file; who reads the numbers will say it
+    except Exception:  # each library has its own exceptions; reading the samples reports the damage
         return None
     try:
         return None if text is None or len(text) > LONGEST else parsed(text)
@@ -300,18 +301,18 @@ def metadata_of(path: Path) -> ImageMetadata | None:
 
 _KEYWORD = b"Description"
 _HEADER_END = 33
-"""Bytes of a PNG's signature and first chunk, behind which others may stand."""
+"""Bytes of a PNG's signature and first chunk; further chunks may follow."""
 
 
 def in_png(data: bytes, statement: ImageMetadata, text: str) -> bytes:
-    """An encoded PNG with a statement: how viewers are to show it, and a text.
+    """Insert metadata into an encoded PNG: chunks for the display transfer function, and a text.
 
-    The pitch stands in the text only: programs that set type print a picture as large as PNG says its pixels are.
+    The pixel pitch is in the text only: typesetting programs print a picture at the size that a PNG declares.
 
     Args:
         data: the whole file.
-        statement: whose transfer function is said in PNG's own words.
-        text: that of the statement, in ASCII.
+        statement: the metadata; its transfer function is also written as PNG chunks.
+        text: the metadata as text, in ASCII.
     """
     shown = _chunk(b"gAMA", struct.pack(">I", 45455 if statement.transfer == "srgb" else 100000))
     if statement.transfer == "srgb":
@@ -325,7 +326,7 @@ def _chunk(kind: bytes, content: bytes) -> bytes:
 
 
 def _png_text(path: Path) -> str | None:
-    """The description before a PNG's samples."""
+    """The description that precedes the samples of a PNG."""
     with path.open("rb") as file:
         if file.read(8) != b"\x89PNG\r\n\x1a\n":
             return None
@@ -343,7 +344,7 @@ def _png_text(path: Path) -> str | None:
 
 
 def tiff_tags(statement: ImageMetadata, text: str) -> dict[str, Any]:
-    """What ``tifffile.imwrite`` takes for a statement: its text, and pixels per centimetre where known."""
+    """Arguments of ``tifffile.imwrite`` for the metadata: the text, and pixels per centimetre if known."""
     tags: dict[str, Any] = {"description": text}
     if statement.pitch is not None:
         down, across = statement.pitch
@@ -367,7 +368,7 @@ def _exr_text(path: Path) -> str | None:
 
 
 def write_npy(values: NDArray[Any], path: Path, text: str) -> None:
-    """An array, and behind it, as another one, its statement."""
+    """Write an array, followed by its metadata as a second array."""
     with path.open("wb") as file:
         npy.write_npy(values, file)
         npy.write_npy(np.array(text.encode("ascii")), file)

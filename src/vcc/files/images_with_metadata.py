@@ -1,4 +1,4 @@
-"""Pictures read together with what they say of their numbers, and light made of these."""
+"""Pictures read with their metadata, and conversion to linear light."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from vcc.optics.electronics import Electronics
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ImageWithMetadata(Brief):
-    """A picture's numbers as they are stored, and what the file says of them.
+    """The samples of a picture as stored, and its metadata.
 
     Args:
         path: the file.
         samples: see `vcc.files.pictures.read_picture`.
-        metadata: None if the file has none, or has that of other numbers.
-        changed: whether it says it of other numbers: another program has changed these, and kept the words.
+        metadata: None if the file has none, or has metadata of other samples.
+        changed: whether another program changed the samples and kept the metadata.
     """
 
     path: Path
@@ -37,10 +37,10 @@ class ImageWithMetadata(Brief):
 
 
 def read_with_metadata(path: str | PathLike[str]) -> ImageWithMetadata:
-    """A picture's numbers and what it says of them.
+    """Read a picture's samples and its metadata.
 
     Raises:
-        InputError: what `vcc.files.pictures.read_picture` refuses, or a damaged statement.
+        InputError: as in `vcc.files.pictures.read_picture`, or damaged metadata.
     """
     path = expanded(path)
     samples, _ = read_picture(path)
@@ -51,7 +51,7 @@ def read_with_metadata(path: str | PathLike[str]) -> ImageWithMetadata:
 
 
 def unknown(picture: ImageWithMetadata) -> str:
-    """That a picture does not say what its numbers are, in words, without a full stop."""
+    """Text, without a full stop, for a picture without valid metadata."""
     if picture.changed:
         return (
             f"{picture.path} holds other numbers than those that it was written with: another program has changed "
@@ -61,7 +61,7 @@ def unknown(picture: ImageWithMetadata) -> str:
 
 
 def clipping(picture: ImageWithMetadata) -> str:
-    """What to say of a picture whose brightest pixels were lost when it was written."""
+    """Warning text for a picture whose brightest pixels were clipped on writing."""
     said = picture.metadata
     assert said is not None
     assert said.clipped is not None
@@ -73,12 +73,13 @@ def clipping(picture: ImageWithMetadata) -> str:
 
 
 def light_of(picture: ImageWithMetadata) -> NDArray[np.float32]:
-    """Light, linear, of a picture that says what its numbers are: coding and exposure undone, not turned.
+    """Linear light of a picture with metadata: encoding and exposure are undone, the orientation is kept.
 
-    Of raw numbers the irradiance that they tell of, behind a colour filter each pixel in its own channel.
+    Raw numbers become irradiance; behind a colour filter, each pixel is in its own channel.
 
     Raises:
-        InputError: numbers that do not fit what the file says: other channels, or coded as sRGB in floating point.
+        InputError: samples that contradict the metadata: a different number of channels, or sRGB in floating
+            point.
     """
     said, samples = picture.metadata, picture.samples
     assert said is not None
@@ -110,15 +111,14 @@ def _irradiance(picture: ImageWithMetadata, raw: RawNumbers) -> NDArray[np.float
 
 
 def light_in(path: Path, told: Literal["auto", "srgb", "linear"]) -> NDArray[np.float32]:
-    """Light, linear, of a picture that somebody took: by what it says of itself, else as told, upright.
+    """Linear light of a picture file, upright; metadata take precedence over ``told``.
 
     Args:
         path: the picture.
-        told: how its whole numbers stand for light where it does not say that; "auto" is sRGB, as pictures for
-            people are.
+        told: transfer function of integers in a picture without metadata; "auto" is sRGB, the usual encoding.
 
     Raises:
-        InputError: a file that cannot be read, one that says otherwise than told, or the raw numbers of a sensor.
+        InputError: an unreadable file, metadata that contradict ``told``, or the raw numbers of a sensor.
     """
     picture = read_with_metadata(path)
     said = picture.metadata
@@ -136,20 +136,20 @@ def light_in(path: Path, told: Literal["auto", "srgb", "linear"]) -> NDArray[np.
 
 
 def check_agrees(path: Path, said: ImageMetadata, told: str) -> None:
-    """Refuse a transfer function that a file contradicts.
+    """Raise if the metadata contradict the given transfer function.
 
     Raises:
-        InputError: ``told`` is "srgb" or "linear", and the file says the other.
+        InputError: ``told`` is "srgb" or "linear", and the metadata state the other.
     """
     if told in ("srgb", "linear") and told != said.transfer:
         raise InputError(f"{path} says that its numbers are {said.in_words}: leave out transfer={told}")
 
 
 def check_usual(path: Path) -> None:
-    """Refuse a picture of a format whose pictures are for people, if it says that it is none.
+    """Raise if the metadata contradict the usual convention of the file's format.
 
     Raises:
-        InputError: it was exposed, turned or is a raw recording, or its whole numbers are linear.
+        InputError: the picture was exposed or rotated, is a raw recording, or has linear integers.
     """
     said = metadata_of(path)
     whole = path.suffix.lower() not in (".exr", ".npy")

@@ -1,7 +1,7 @@
-"""What a JPEG says of itself, and whether its data go as far as that.
+"""Parsing of JPEG headers, and a check that the coded data are complete.
 
-libjpeg paints what is missing grey and says nothing, and unpacks as often as the file asks for. Source of the
-structure: ITU-T T.81 (1992), annex B.
+libjpeg fills missing data with grey without a warning, and decodes as many scans as the file declares. Source
+of the structure: ITU-T T.81 (1992), annex B.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SCAN, _RESTARTS, _END = 0xDA, 0xDD, 0xD9
 
 
 class NotThere(Exception):
-    """What is wrong with a JPEG, in words for people."""
+    """A fault of a JPEG, as text for people."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Scan:
     """One pass over the picture.
 
     Args:
-        components: the numbers of those in it.
-        restarts: after so many units the coding starts anew; 0 for never.
-        start: the first byte of its coded data.
-        end: the byte after them.
+        components: identifiers of the components in the scan.
+        restarts: number of units between restart markers; 0 for none.
+        start: offset of the first byte of coded data.
+        end: offset of the byte after the coded data.
     """
 
     components: tuple[int, ...]
@@ -47,10 +47,10 @@ class Jpeg:
 
     Args:
         coding: "sequential", "progressive" or "lossless".
-        bits: of a sample.
+        bits: bits of a sample.
         height: rows.
         width: columns.
-        sampling: (down, across) of each component by its number: how many blocks a unit has of it.
+        sampling: (down, across) of each component by its identifier: blocks of the component in a unit.
         scans: all of them.
     """
 
@@ -62,7 +62,7 @@ class Jpeg:
     scans: tuple[Scan, ...]
 
     def blocks(self, component: int, alone: bool) -> tuple[int, int]:
-        """(rows, columns) of a component's blocks: those that a scan of it alone has, or in whole units."""
+        """(rows, columns) of a component's blocks: in a scan of this component alone, or padded to whole units."""
         most_down, most_across = (max(each[axis] for each in self.sampling.values()) for axis in (0, 1))
         side = 1 if self.coding == "lossless" else 8
         down, across = self.sampling[component]
@@ -73,7 +73,7 @@ class Jpeg:
         return units[0] * down, units[1] * across
 
     def units(self, scan: Scan) -> int:
-        """How many units a scan has."""
+        """Number of units in a scan."""
         first = scan.components[0]
         alone = len(scan.components) == 1
         rows, columns = self.blocks(first, alone)
@@ -82,11 +82,11 @@ class Jpeg:
 
 
 def parsed(data: bytes) -> Jpeg:
-    """What a JPEG says of itself.
+    """Parse the header and the scans of a JPEG.
 
     Raises:
-        NotThere: no JPEG, one that ends before its end marker, of several frames, without a size, of a coding that
-            is not known, or in which restarts are missing.
+        NotThere: not a JPEG, no end marker, several frames, no size, an unsupported coding, or missing restart
+            markers.
     """
     if not data.startswith(b"\xff\xd8"):
         raise NotThere("it does not begin as one")
@@ -123,7 +123,7 @@ def parsed(data: bytes) -> Jpeg:
 
 
 def _ends_of_scans(data: bytes) -> NDArray[np.intp]:
-    """Where coded data may end: at markers that are no restarts, and where the file does."""
+    """Offsets at which coded data may end: markers other than restarts, and the end of the file."""
     codes = np.frombuffer(data, np.uint8)
     found = np.flatnonzero(codes[:-1] == 255)
     after = codes[found + 1]
@@ -132,7 +132,7 @@ def _ends_of_scans(data: bytes) -> NDArray[np.intp]:
 
 
 def longer(jpeg: Jpeg, data: bytes, filling: bytes) -> bytes:
-    """The same JPEG with some bytes after the data of each scan: nobody asks for them if the data are complete."""
+    """The same JPEG with extra bytes after each scan: a decoder reads them only if data are missing."""
     parts, last = [], 0
     for scan in jpeg.scans:
         parts += [data[last : scan.end], filling]
@@ -141,7 +141,7 @@ def longer(jpeg: Jpeg, data: bytes, filling: bytes) -> bytes:
 
 
 def least_bytes(jpeg: Jpeg) -> int:
-    """Bytes below which no data can code all blocks: each takes a bit or more in the first scan that has it."""
+    """Lower bound for the size of the data: each block takes at least one bit in its first scan."""
     counted = [jpeg.blocks(component, True) for component in jpeg.sampling]
     return sum(rows * columns for rows, columns in counted) // 8
 
@@ -169,7 +169,7 @@ def _scan(segment: bytes, sampling: dict[int, tuple[int, int]], restarts: int, s
 
 
 def _check_restarts(jpeg: Jpeg, data: bytes) -> None:
-    """After a restart that is missing, the library goes on in grey."""
+    """Raise if restart markers are missing: after a missing one, the library continues in grey."""
     for scan in jpeg.scans:
         if scan.restarts:
             wanted = -(-jpeg.units(scan) // scan.restarts) - 1

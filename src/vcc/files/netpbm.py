@@ -1,4 +1,4 @@
-"""Netpbm's binary pictures, ``.ppm`` and ``.pgm`` (JPEG Pleno's light fields are such), and floats, ``.pfm``."""
+"""Binary Netpbm pictures, ``.ppm`` and ``.pgm`` (used by JPEG Pleno's light fields), and floats, ``.pfm``."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ _HEADER_OF_FLOATS = re.compile(rb"(P[fF])\s+(\d{1,18})\s+(\d{1,18})\s+(\S+)[ \t\
 def read_netpbm(path: Path) -> NDArray[Any]:
     """The samples of a P5 or P6 file, shape (rows, columns) or (rows, columns, 3).
 
-    A largest value of 255 or 65535 leaves them as they are; any other (1023 for 10 bits) is widened so that it
-    becomes the full scale of uint8 or uint16, rounded.
+    Samples with a maximum of 255 or 65535 are returned unchanged; other maxima (1023 for 10 bits) are scaled to
+    the full range of uint8 or uint16, rounded.
 
     Raises:
-        InputError: another format, a truncated file, or samples above the stated largest value.
+        InputError: another format, a truncated file, or samples above the declared maximum.
     """
     data = path.read_bytes()
     match = _HEADER.match(data)
@@ -56,7 +56,7 @@ def read_pfm(path: str | PathLike[str]) -> NDArray[np.float32]:
     """The numbers of a PFM file, (rows, columns) or (rows, columns, 3), first row at the top.
 
     Raises:
-        InputError: no such file, another format, or one that is truncated.
+        InputError: no such file, another format, or a truncated file.
     """
     path = expanded(path)
     data = read_bytes(path)

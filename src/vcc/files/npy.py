@@ -1,4 +1,4 @@
-"""NumPy's own files of one array, ``.npy``."""
+"""NumPy files of one array, ``.npy``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ZIP = b"PK\x03\x04"
 
 
 def write_npy(values: NDArray[Any], stream: IO[bytes]) -> None:
-    """Write an array as ``numpy.save`` does, which says of a full disk no more than how many elements fitted.
+    """Write an array like ``numpy.save``, whose error for a full disk gives only the number of elements written.
 
     Raises:
         OSError: the disk refuses.
@@ -26,14 +26,14 @@ def write_npy(values: NDArray[Any], stream: IO[bytes]) -> None:
 
 
 def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
-    """The array in a ``.npy``, in memory of its own that is no larger than the file.
+    """Read the array of a ``.npy`` file into new memory that is no larger than the file.
 
     Args:
         path: the file.
-        what: it is, for an error.
+        what: noun for messages.
 
     Raises:
-        InputError: no such file, one that is truncated or damaged, or one of Python objects, which nothing reads.
+        InputError: no such file, a truncated or damaged file, or one of Python objects, which are never loaded.
     """
     check_file(path, what)
     with reading(path, "a NumPy array"):
@@ -41,7 +41,7 @@ def read_npy(path: Path, what: str = "file") -> NDArray[Any]:
             several = file.read(len(_ZIP)) == _ZIP
         if several:
             raise InputError(f"{path} is not one array of NumPy's but several, an .npz: rename it")
-        # Mapped, a file that states more than it holds is refused before there is memory for what it states.
+        # A memory map raises for a file that declares more than it holds before memory is allocated.
         try:
             return np.array(np.lib.format.open_memmap(path, mode="r"))
         except ValueError as error:

@@ -1,7 +1,7 @@
-"""Names of files and folders in the making, and what killed writers left of them.
+"""Temporary names of files and folders, and cleaning up after killed writers.
 
-What is written stands under a temporary name beside its target until it is whole. The name says which process of
-which machine writes it, so that the next writer of the same target can tell what is dead from what is at work.
+Until it is complete, output has a temporary name next to its target. The name contains the machine and the
+process of the writer, so the next writer of the same target can distinguish leftovers from work in progress.
 """
 
 from __future__ import annotations
@@ -23,24 +23,24 @@ from vcc.base.errors import InputError
 from vcc.base.reading import shown
 
 DAY = 86400.0
-"""Seconds after which a part of another machine's process, of which nothing is known, counts as left behind."""
+"""Seconds after which a temporary file of another machine's process (state unknown) counts as abandoned."""
 
 
 def part_of(target: Path) -> Path:
-    """A name beside a target, with its ending, for what will become it."""
+    """Temporary name next to a target, with its extension, for new content."""
     return _named(target, "part")
 
 
 def set_aside(target: Path) -> Path:
-    """A name beside a target for what stood there, while another takes its place."""
+    """Temporary name next to a target for its old content during replacement."""
     return _named(target, "old")
 
 
 def check_name(target: Path) -> None:
-    """Refuse a name that no file can have.
+    """Raise for a name that the file system does not allow.
 
     Raises:
-        InputError: it is too long.
+        InputError: the name is too long.
     """
     size, most = len(os.fsencode(target.name)), _longest_name(target.parent)
     if size > most:
@@ -51,7 +51,7 @@ def check_name(target: Path) -> None:
 
 
 def lock_of(target: Path) -> Path:
-    """A name beside a target, for the lock of who writes it."""
+    """Name of the lock file next to a target."""
     stem, suffix = stem_and_ending(target)
     return target.with_name(f".{stem}{suffix}.lock")
 
@@ -63,13 +63,13 @@ def _named(target: Path, state: str) -> Path:
 
 
 _LONGEST_ENDING = 16
-"""Bytes of what is an ending; more are part of a name."""
+"""Bytes of the longest extension; a longer suffix counts as part of the name."""
 _ADDED = len(f"..{'.'}{'0' * 8}-{'0' * 10}-{'0' * 8}.part.lock")
-"""Characters that names made of a target's have more than it, at most: those of the lock of a part."""
+"""Most characters that temporary names add to the target's name: the lock of a part."""
 
 
 def stem_and_ending(target: Path) -> tuple[str, str]:
-    """Stem and ending of a target; the stem cut, and marked, where names made of it would be too long."""
+    """Stem and extension of a target; a stem too long for temporary names is cut and gets a checksum."""
     stem, suffix = target.stem, target.suffix
     if len(os.fsencode(suffix)) > _LONGEST_ENDING:
         stem, suffix = target.name, ""
@@ -90,12 +90,12 @@ def _longest_name(folder: Path) -> int:
 
 
 def clear_leftovers(target: Path, patience: float = DAY) -> None:
-    """Remove the parts of a target whose writers are dead.
+    """Remove temporary files of a target whose writers are dead.
 
     Args:
-        target: file or folder that is about to be written.
-        patience: seconds that a part must have been untouched where nobody can tell whether its writer lives,
-            because that is a process of another machine or container; 0 where this process alone may write.
+        target: file or folder to be written.
+        patience: seconds that a temporary file must be untouched if the state of its writer, a process of
+            another machine or container, is unknown; 0 if only this process can write.
     """
     for left in _left(target, "part", patience):
         _remove(left)
@@ -105,10 +105,10 @@ def clear_leftovers(target: Path, patience: float = DAY) -> None:
 
 
 def clear_folder(folder: Path, patience: float) -> int:
-    """Remove the parts of all targets in a folder whose writers are dead; see `clear_leftovers`.
+    """Remove temporary files of all targets in a folder whose writers are dead; see `clear_leftovers`.
 
     Returns:
-        How many there were.
+        The number of removed files and folders.
     """
     found = list(_parts(folder, r".+", "part", r"(\.[^.]*)?", patience))
     for left in found:
@@ -117,7 +117,7 @@ def clear_folder(folder: Path, patience: float) -> int:
 
 
 def settle(folder: Path) -> None:
-    """Have the disk hold a folder and all that is in it: what is renamed then is whole after a power cut, too.
+    """Flush a folder and its content to the disk, so that a later rename survives a power cut.
 
     Raises:
         OSError: the disk refuses.
@@ -129,7 +129,7 @@ def settle(folder: Path) -> None:
 
 
 def settle_names(folder: Path) -> None:
-    """Have the disk hold the names in a folder.
+    """Flush the names in a folder to the disk.
 
     Raises:
         OSError: the disk refuses.
@@ -147,19 +147,19 @@ def _settle(path: str | Path, how: int) -> None:
 
 
 def put_in_place(part: Path, target: Path, replace: bool) -> None:
-    """Give a finished folder its name; what stood there is then gone.
+    """Rename a finished folder to its target; existing content is removed.
 
-    Where the system can exchange two names in one step (Linux, on most file systems), one or the other stands
-    there at every moment. Elsewhere there is one between two renames in which none does: `put_back` repairs what a
-    kill leaves then.
+    If the system can exchange two names in one step (Linux, on most file systems), the target exists at every
+    moment. Elsewhere it is missing between two renames; `put_back` repairs the state after a kill at that
+    moment.
 
     Args:
         part: the finished folder.
-        target: its name.
-        replace: whether a folder may stand there; else the disk refuses one that is not empty.
+        target: the final name.
+        replace: whether to replace an existing folder; if False, one that is not empty raises.
 
     Raises:
-        OSError: the disk refuses. What stood there stands there.
+        OSError: the disk refuses. Existing content stays in place.
     """
     if not (replace and target.exists()):
         part.rename(target)
@@ -177,14 +177,14 @@ def put_in_place(part: Path, target: Path, replace: bool) -> None:
 
 
 _CANNOT = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP}
-"""What a system or file system says that does not exchange names."""
+"""Errors of a system or file system that cannot exchange names."""
 
 
 def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange two names in one step, if that can be; see renameat2(2)."""
+    """Exchange two names in one step and return True; False if not supported. See renameat2(2)."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):  # another system
+    except (AttributeError, OSError, TypeError):  # not Linux
         return False
     here, exchange = -100, 2  # AT_FDCWD, RENAME_EXCHANGE
     if rename(here, os.fsencode(one), here, os.fsencode(other), exchange) == 0:
@@ -196,13 +196,13 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 
 def put_back(target: Path) -> bool:
-    """Put back what stood under a name, where a writer died between taking it away and replacing it.
+    """Restore the old content of a target whose writer died while replacing it.
 
     Returns:
-        Whether it was.
+        Whether content was restored.
 
     Raises:
-        OSError: it is there, and the disk refuses.
+        OSError: the old content exists and the disk refuses.
     """
     if os.path.lexists(target) or not target.parent.is_dir():
         return False
@@ -214,17 +214,17 @@ def put_back(target: Path) -> bool:
 
 
 def _left(target: Path, state: str, patience: float) -> Iterator[Path]:
-    """What writers that are dead left of a target."""
+    """Temporary names of a target whose writers are dead."""
     stem, suffix = stem_and_ending(target)
     return _parts(target.parent, re.escape(stem), state, re.escape(suffix), patience)
 
 
 def _parts(folder: Path, stem: str, state: str, suffix: str, patience: float) -> Iterator[Path]:
-    """What writers that are dead left of targets of such names, as regular expressions."""
+    """Temporary names of all targets that match the regular expressions, whose writers are dead."""
     pattern = re.compile(rf"\.?\.{stem}\.([0-9a-f]{{8}})-(\d+)-[0-9a-f]{{8}}\.{state}{suffix}(\.lock)?")
     try:
-        names = os.listdir(folder)  # noqa: PTH208  (of thousands of names, paths are made of few)
-    except OSError:  # what is written next says so, where that cannot be written either
+        names = os.listdir(folder)  # noqa: PTH208  (thousands of names; paths are made for few)
+    except OSError:  # the next write reports an inaccessible folder
         return
     for name in names:
         match, path = pattern.fullmatch(name), folder / name
@@ -233,18 +233,18 @@ def _parts(folder: Path, stem: str, state: str, suffix: str, patience: float) ->
 
 
 def _dead(machine: str, process: int, path: Path, patience: float) -> bool:
-    """Whether the writer of a part is known to be dead, or left it alone for long enough."""
+    """Whether the writer of a temporary file is dead, or did not touch it for ``patience`` seconds."""
     if machine == _machine():
-        return process != os.getpid() if patience == 0 else not _runs(process)  # a zombie runs, too
+        return process != os.getpid() if patience == 0 else not _runs(process)  # a zombie counts as running
     try:
         touched = max(each.lstat().st_ctime for each in (path, *path.rglob("*")))
-    except OSError:  # somebody is at work there
+    except OSError:  # files vanish: a writer is active
         return False
     return time.time() - touched > patience
 
 
 def _runs(process: int) -> bool:
-    if os.name != "posix":  # os.kill would end it there
+    if os.name != "posix":  # os.kill would end the process
         return True
     try:
         os.kill(process, 0)
@@ -257,12 +257,12 @@ def _runs(process: int) -> bool:
 
 @functools.cache
 def _machine() -> str:
-    """Eight digits for the machine since it started, and the container: where a process has its number."""
+    """Eight hex digits for the machine since its last start and the container: the scope of process numbers."""
     known = [platform.node()]
     for name, read in (("/proc/sys/kernel/random/boot_id", _text), ("/proc/self/ns/pid", os.readlink)):
         try:
             known.append(read(name))
-        except OSError:  # no Linux
+        except OSError:  # not Linux
             known.append("")
     return f"{zlib.crc32(' '.join(known).encode()):08x}"
 

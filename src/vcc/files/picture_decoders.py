@@ -1,7 +1,7 @@
-"""Bytes of pictures to samples, by libraries that are told first what they may believe.
+"""Decoding of pictures by libraries, after checks of the declared sizes.
 
-A header may claim more than its file holds: libraries then take the memory that it asks for, read beyond their
-input, or fill up with black. So sizes are held against the file before a library unpacks it.
+A header may declare more than its file holds; libraries then allocate that memory, read past their input, or
+fill with black. Sizes are compared with the file before a library decodes it.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ NOT_OPAQUE = (
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}  # by the type of colour; a palette may have opacity
-_SCANS = 16  # of a JPEG: a progressive picture has some ten, and each passes over all of it
+_SCANS = 16  # a progressive JPEG has about ten, and each covers the whole picture
 _TIFF_JPEG = 7
 _PALETTE_NOT_GREY = ("P", "1")
-_PLAIN_BMP = (0, 3)  # as it is, with bit fields
+_PLAIN_BMP = (0, 3)  # uncompressed; with bit fields
 
 
 class Unsuitable(Exception):
-    """A file that its library reads, and this package does not want."""
+    """A file that its library can read but this package does not support."""
 
 
 def read_png(path: Path) -> NDArray[Any]:
-    """The samples of a PNG with all of its channels, opacity among them."""
+    """The samples of a PNG with all channels, including alpha."""
     return decode_png(path.read_bytes())
 
 
 def decode_png(data: bytes, out: NDArray[Any] | None = None) -> NDArray[Any]:
-    """The samples of a PNG with all of its channels, into memory that is there already, if any is given.
+    """Decode a PNG with all channels, into ``out`` if given.
 
     Raises:
-        Exception: of any type; what is wrong.
+        Exception: of any type, if the data are damaged.
     """
     import imagecodecs
 
@@ -56,10 +56,10 @@ def decode_png(data: bytes, out: NDArray[Any] | None = None) -> NDArray[Any]:
 
 
 def read_exr_channels(path: Path) -> dict[str, NDArray[Any]]:
-    """All channels of an OpenEXR file by their names, of its first part if it has several.
+    """All channels of an OpenEXR file by name; of its first part if it has several.
 
     Raises:
-        Exception: of any type; what is wrong.
+        Exception: of any type, if the file is damaged.
     """
     import OpenEXR
 
@@ -76,7 +76,7 @@ def read_exr_channels(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _check_png(data: bytes) -> None:
-    """Refuse a PNG that claims too much or does not reach its end."""
+    """Raise for a PNG that declares too much or is truncated."""
     place = len(_PNG)
     while data.startswith(_PNG):
         length = int.from_bytes(data[place : place + 4], "big")
@@ -104,7 +104,7 @@ def _read_jpeg(path: Path) -> NDArray[Any]:
 
 
 def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
-    """The samples of a JPEG, whose tables may be elsewhere."""
+    """Decode a JPEG; its tables may be given separately."""
     import imagecodecs
 
     jpeg = jpeg_headers.parsed(data)
@@ -115,8 +115,9 @@ def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
         raise ValueError(f"{jpeg.width}×{jpeg.height} pixels take more than its {len(data):,} bytes")
     samples: NDArray[Any] = imagecodecs.jpeg8_decode(data, tables=tables)
     if jpeg.coding == "lossless" or (samples[-1, -1] == 1 << (jpeg.bits - 1)).all():
-        # It ends in the grey that the library paints where data are missing. Data that come later are not looked
-        # at if they are complete, and are taken for the missing ones if not.
+        # The last sample is the library's fill colour. The decoder ignores extra data after a complete picture,
+        # and
+        # reads them in place of missing data.
         filled = imagecodecs.jpeg8_decode(jpeg_headers.longer(jpeg, data, _FILLING), tables=tables)
         if not np.array_equal(samples, filled):
             raise ValueError("the end of the picture is missing")
@@ -125,7 +126,7 @@ def _decode_jpeg(data: bytes, tables: bytes | None = None) -> NDArray[Any]:
 
 _FILLING = bytes(
     np.random.default_rng(8).integers(0, 255, 256, dtype=np.uint8)
-)  # has no 255, which begins markers
+)  # without 255, the first byte of markers
 
 
 def _read_tiff(path: Path) -> NDArray[Any]:
@@ -149,9 +150,9 @@ def _read_tiff(path: Path) -> NDArray[Any]:
 
 
 def _check_tiff(page: Any, path: Path) -> None:
-    """Refuse a TIFF that claims too much, or some of whose strips or tiles are not in the file.
+    """Raise for a TIFF that declares too much, or whose strips or tiles are partly missing from the file.
 
-    The library leaves those black.
+    The library leaves missing ones black.
     """
     size, width = path.stat().st_size, page.dtype.itemsize
     palette = 3 if page.colormap is not None else 1
@@ -184,7 +185,7 @@ def _read_bmp(path: Path) -> NDArray[Any]:
         if picture.info["compression"] not in _PLAIN_BMP:
             raise Unsuitable("this BMP is packed, which few programs do; save it as PNG")
         if picture.mode == "P":
-            palette: Any = picture.palette  # its colours as the file has them
+            palette: Any = picture.palette  # colours as stored in the file
             colours = len(palette.palette) // len(palette.rawmode)
             if np.asarray(picture).max() >= colours:
                 raise ValueError(f"it has colours beyond the {colours} of its palette")
@@ -223,4 +224,4 @@ DECODERS: dict[str, Callable[[Path], NDArray[Any]]] = {
     ".ppm": read_netpbm,
     ".pgm": read_netpbm,
 }
-"""What reads a file, by its ending; any exception says what is wrong."""
+"""The decoder for each extension; a decoder may raise any exception."""

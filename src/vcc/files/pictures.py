@@ -1,4 +1,4 @@
-"""Single pictures: reading what is stored in a file, and writing one for people or for programs."""
+"""Reading single pictures as stored, and writing pictures for people or for programs."""
 
 from __future__ import annotations
 
@@ -22,51 +22,50 @@ from vcc.files.image_metadata import ImageMetadata, in_png, metadata_of, tiff_ta
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
-"""The endings that `read_picture` knows."""
+"""Extensions that `read_picture` supports."""
 WRITE_ENDINGS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".exr", ".npy")
+"""Extensions that `save_picture` supports."""
 _JPEG = (".jpg", ".jpeg")
 _JPEG_QUALITY = 92
-"""The endings that `save_picture` knows."""
 RAW_ENDINGS = (".tif", ".tiff", ".png", ".npy")
-"""The endings that `save_numbers` knows."""
+"""Extensions that `save_numbers` supports."""
 
 Exposure = float | Literal["auto"]
-"""A factor on light before the sRGB curve; "auto" is that of `auto_exposure`."""
+"""A factor applied to light before the sRGB curve; "auto" uses `auto_exposure`."""
 
 _COLOURS = ("red", "green", "blue")
 _BRIGHT_PERCENTILE = 99.5
 
 
 def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
-    """The samples of a picture as they are stored: nothing is scaled and no transfer curve undone.
+    """Read the samples of a picture as stored: without scaling, and without undoing a transfer curve.
 
-    PNG and JPEG of 8 bits and PNG of 16, TIFF, BMP, OpenEXR, Netpbm, and NumPy's .npy. Palettes become the
-    colours that they stand for, and PNGs of 1, 2 or 4 bits are widened to 8 (1-bit: 0 and 255), Netpbm of 10 to
-    16. A channel of opacity (alpha) that is opaque everywhere is dropped; any other is refused, because
-    what lies behind is not known. OpenEXR gives the channels R, G, B, or the only one that there
-    is.
+    Supports PNG of 8 and 16 bits, JPEG of 8 bits, TIFF, BMP, OpenEXR, Netpbm and NumPy's .npy. Palettes are
+    converted to colours. PNGs of 1, 2 or 4 bits are scaled to 8 (1-bit: 0 and 255), Netpbm of 10 bits to 16. A
+    fully opaque alpha channel is dropped; any other raises, because the background is unknown. OpenEXR returns
+    the channels R, G, B, or the only channel.
 
     Returns:
         The samples, shape (rows, columns) or (rows, columns, channels), uint8, uint16 or float32,
-        and their number of bits: 8, 16 or 32.
+        and the number of bits: 8, 16 or 32.
 
     Raises:
-        InputError: no such file, an ending that is not known, a truncated or damaged file, a
-            picture that is not of one of these types, or one that is not opaque.
+        InputError: no such file, an unsupported extension, a truncated or damaged file, an unsupported sample
+            type, or a picture that is not opaque.
     """
     path = Path(path)
     return _checked(read_stored(path), path)
 
 
 def read_stored(path: str | PathLike[str]) -> NDArray[Any]:
-    """The samples of a picture as its library gives them: a PNG may have opacity as its last channel.
+    """Read the samples of a picture as its library returns them: a PNG may have alpha as its last channel.
 
     Returns:
-        Of any type and shape.
+        An array of any type and shape.
 
     Raises:
-        InputError: no such file, an ending that is not known, a truncated or damaged file, or one that claims more
-            than it can hold.
+        InputError: no such file, an unsupported extension, a truncated or damaged file, or one that declares
+            more than it can hold.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -82,7 +81,7 @@ def read_stored(path: str | PathLike[str]) -> NDArray[Any]:
         raise InputError(f"{path}: {error}") from None
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from None
-    except Exception as error:  # each library has its own types for a damaged file
+    except Exception as error:  # each library has its own exceptions for damaged files
         raise InputError(
             f"{path} cannot be read as a picture: it is truncated, damaged or not a "
             f"{ending[1:].upper()} file ({str(error)[:200]}). Copy it again from where it came from"
@@ -90,34 +89,34 @@ def read_stored(path: str | PathLike[str]) -> NDArray[Any]:
 
 
 def read_png_into(path: Path, out: NDArray[Any]) -> bool:
-    """Read a PNG of just this shape and type into memory that is there already, which spares fresh memory.
+    """Read a PNG of the shape and type of ``out`` into ``out``, without allocating memory.
 
     Args:
         path: the file.
         out: where to write, shape (rows, columns) or (rows, columns, channels), uint8 or uint16, contiguous.
 
     Returns:
-        False, with anything in ``out``, for whatever is not such a PNG: `read_picture` reads it, or says why not.
+        False, with undefined content of ``out``, if the file is not such a PNG: `read_picture` reads it or raises.
     """
     if path.suffix.lower() != ".png" or out.dtype not in (np.uint8, np.uint16) or not path.is_file():
         return False
     try:
         decode_png(path.read_bytes(), out)
-    except Exception:  # each library has its own types for a damaged file
+    except Exception:  # each library has its own exceptions for damaged files
         return False
     return True
 
 
 def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
-    """A mask file as transmission: the mean of the channels, 0 to 1, shape (rows, columns).
+    """Read a mask file as transmission: the mean of the channels, 0 to 1, shape (rows, columns).
 
-    A mask's file states how much light passes, so its samples are taken as they are, *not* as sRGB:
-    an 8-bit 128 is a transmission of 128/255 = 0.502. Integers are fractions of full scale;
-    floating-point values are the transmission itself.
+    A mask file stores transmission, so its samples are used directly, *not* as sRGB: an 8-bit 128 is a
+    transmission of 128/255 = 0.502. Integers are fractions of full scale; floating-point values are the
+    transmission itself.
 
     Raises:
-        InputError: what `read_picture` refuses, a floating-point value outside 0…1, or a picture that says that
-            its numbers are something else: coded for people, or a raw recording.
+        InputError: as in `read_picture`; a floating-point value outside 0…1; or metadata that declare other
+            numbers (sRGB or exposed, or a raw recording).
     """
     refuse_coded(Path(path), "a mask's file states how much light passes")
     samples, bits = read_picture(path)
@@ -133,14 +132,14 @@ def read_grey(path: str | PathLike[str]) -> NDArray[np.float64]:
 
 
 def refuse_coded(path: Path, wanted: str) -> None:
-    """Refuse a picture that says of itself that its numbers are not simply proportional to what they state.
+    """Raise if a picture's metadata declare numbers that are not proportional to the stored quantity.
 
     Args:
         path: the picture.
-        wanted: what its numbers are to be, a clause for the message.
+        wanted: a clause for the message: the required meaning of the numbers.
 
     Raises:
-        InputError: it was written for people (sRGB, exposed), or as the raw numbers of a sensor.
+        InputError: the picture was written for display (sRGB, exposed), or as raw numbers of a sensor.
     """
     said = metadata_of(path)
     if said is not None and (said.transfer == "srgb" or not said.is_neutral):
@@ -152,14 +151,13 @@ def refuse_coded(path: Path, wanted: str) -> None:
 
 @dataclass(frozen=True)
 class SavedPicture(Shown):
-    """What was written: where, with which exposure, and a line that says so to a person.
+    """A report on a written picture: path, exposure, clipping and a line for people.
 
     Args:
         path: the file; None for a buffer.
-        exposure: the factor between the image's values and what was stored (before the sRGB curve);
-            pass it on for another picture, and the two can be compared.
-        clipped: the share of the pixels, 0 to 1, in which a channel was brighter than the file can
-            hold.
+        exposure: the factor between the image's values and the stored values (before the sRGB curve); use it
+            for another picture to make the two comparable.
+        clipped: fraction of the pixels, 0 to 1, in which a channel exceeded the range of the file.
         description: one line for people.
     """
 
@@ -178,13 +176,13 @@ def save_picture(
     bits: int | None = None,
     format: str | None = None,
 ) -> SavedPicture:
-    """Write linear values; the ending chooses the format: sRGB in PNG and TIFF, untouched in OpenEXR and .npy.
+    """Write linear values; the extension selects the format: sRGB in PNG and TIFF, unchanged in OpenEXR and .npy.
 
     Args:
-        values: as they are to be seen, shape (rows, columns) or (rows, columns, channels).
-        target: where to.
-        statement: what the values are; how they are written is added.
-        exposure: see `vcc.Image.save`, likewise the bits, the format and what is returned.
+        values: upright, shape (rows, columns) or (rows, columns, channels).
+        target: path or buffer to write to.
+        statement: meaning of the values; the encoding is added.
+        exposure: see `vcc.Image.save`, also for bits, format and the return value.
         bits: see there.
         format: see there.
 
@@ -199,18 +197,18 @@ def save_picture(
 def save_numbers(
     values: NDArray[Any], target: Target, statement: ImageMetadata, words: str, format: str | None = None
 ) -> SavedPicture:
-    """Write a camera's raw numbers as they are: linear, not scaled, not turned.
+    """Write the raw numbers of a camera unchanged: linear, not scaled, not rotated.
 
     Args:
         values: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
-        target: where to, .tif, .tiff, .png or .npy.
-        statement: what the numbers are; ``clipped`` is the share of the pixels that are saturated.
-        words: the same for people.
-        format: of a buffer.
+        target: path or buffer, .tif, .tiff, .png or .npy.
+        statement: meaning of the numbers; ``clipped`` is the fraction of saturated pixels.
+        words: the same as text for people.
+        format: format of a buffer.
 
     Raises:
-        InputError: another ending, a number of channels that the format does not have, or a place that cannot be
-            written to.
+        InputError: another extension, a number of channels that the format does not support, or a target that
+            is not writable.
     """
     place = Destination.of("raw numbers", target, format, RAW_ENDINGS)
     ending, values = place.ending, _grey_if_one(values)
@@ -228,16 +226,15 @@ def save_numbers(
 
 
 def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
-    """The exposure that "auto" stands for: 1 over the 99.5th percentile of the pixels' brightest channels (1 if
-    black).
+    """The automatic exposure: 1 over the 99.5th percentile of each pixel's brightest channel (1 if black).
 
-    Luminance would not do: a saturated blue has 7 % of the luminance of white, and would clip long before.
+    Luminance is unsuitable: a saturated blue has 7 % of the luminance of white, and would clip much earlier.
 
     Args:
         values: linear, shape (rows, columns) or (rows, columns, channels).
 
     Returns:
-        The factor with which at most 0.5 % of the pixels exceed 1 in any channel.
+        The factor for which at most 0.5 % of the pixels exceed 1 in any channel.
     """
     brightest = _brightest_channel(values)
     bright = float(np.percentile(brightest, _BRIGHT_PERCENTILE, method="higher"))
@@ -247,11 +244,11 @@ def auto_exposure(values: NDArray[np.floating[Any]]) -> float:
 
 
 def auto_in_words(values: NDArray[np.floating[Any]], exposure: float) -> str:
-    """What `auto_exposure` made white, for people; it names the channel of colour that is brightest there.
+    """Text on the level that `auto_exposure` maps to white; names the brightest colour channel there.
 
     Args:
         values: linear, shape (rows, columns), (rows, columns, 1) or (rows, columns, 3).
-        exposure: that `auto_exposure` found for them.
+        exposure: result of `auto_exposure` for these values.
     """
     channel = ""
     if values.shape[2:] == (3,):
@@ -266,9 +263,9 @@ def _brightest_channel(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def averaged(values: NDArray[Any], factor: int) -> NDArray[np.float32]:
-    """A picture of 1 pixel for each factor×factor; what is left over at the right and below is left out.
+    """Average blocks of factor×factor pixels; the remainder at the right and bottom is left out.
 
-    Along an axis that has no more pixels than the factor all become one.
+    An axis shorter than the factor is averaged to one pixel.
     """
     if factor == 1:
         return np.asarray(values, dtype=np.float32)
@@ -281,14 +278,14 @@ def averaged(values: NDArray[Any], factor: int) -> NDArray[np.float32]:
 def write_codes(
     codes: NDArray[Any], path: Path, ending: str, statement: ImageMetadata, *, png_level: int | None = None
 ) -> None:
-    """Write stored numbers as they are, in a PNG or a TIFF that says what they are.
+    """Write stored numbers unchanged, in a PNG or a TIFF with metadata.
 
     Args:
         codes: uint8 or uint16, shape (rows, columns) or (rows, columns, channels).
-        path: where to; not atomic.
+        path: path to write to; not atomic.
         ending: ".png"; any other is TIFF.
-        statement: what they are; of raw numbers the full scale stays, else it is that of the type.
-        png_level: how hard a PNG is packed, 0 to 9; None for the library's own.
+        statement: the metadata; for raw numbers its full scale is kept, else it becomes that of the type.
+        png_level: compression level of a PNG, 0 to 9; None for the library's default.
     """
     codes = np.ascontiguousarray(_grey_if_one(codes))
     if statement.recording is None:
@@ -356,13 +353,13 @@ def _save_display(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Coded(Brief):
-    """Linear light as screens show it.
+    """Linear light encoded for screens.
 
     Args:
         codes: sRGB, uint8 or uint16, shape (rows, columns) or (rows, columns, 3).
         exposure: the factor before the curve.
-        clipped: the share of the pixels, 0 to 1, in which a channel was too bright.
-        negative: the share in which one was below 0, and is black.
+        clipped: fraction of the pixels, 0 to 1, in which a channel was clipped at white.
+        negative: fraction of the pixels in which a channel was below 0 and became black.
     """
 
     codes: NDArray[Any]
@@ -372,16 +369,16 @@ class Coded(Brief):
 
 
 def coded_picture(values: NDArray[np.float32], exposure: Exposure, bits: int, where: str) -> Coded:
-    """Linear values exposed and coded as sRGB: what is stored for people, and shown.
+    """Expose linear values and encode them as sRGB, for storage and display.
 
     Args:
         values: shape (rows, columns) or (rows, columns, channels).
         exposure: see `vcc.Image.save`.
         bits: 8 or 16.
-        where: it is shown, for the errors, a clause that ends in "which".
+        where: clause for messages that names the medium and ends in "which".
 
     Raises:
-        InputError: neither 1 nor 3 channels, values that are not finite, or an unusable exposure.
+        InputError: neither 1 nor 3 channels, non-finite values, or an invalid exposure.
     """
     values = _grey_if_one(values)
     if values.ndim == 3 and values.shape[2] != 3:
@@ -395,15 +392,15 @@ def coded_picture(values: NDArray[np.float32], exposure: Exposure, bits: int, wh
         raise InputError(f"the image has {values[at]} at index {at}, which cannot be shown; .npy and .exr hold it")
     factor = auto_exposure(values) if exposure == "auto" else checked_exposure(exposure)
     exposed = values * np.float32(factor)
-    clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # what rounds to white is not lost
+    clipped = _share_beyond(exposed > 1 + 0.5 / (2**bits - 1))  # values that round to white are not clipped
     return Coded(transfer.encode(exposed, bits), factor, clipped, _share_beyond(exposed < 0))
 
 
 def checked_exposure(exposure: Any) -> float:
-    """An exposure given as a number.
+    """Check an exposure given as a number.
 
     Raises:
-        InputError: it is not a finite number above 0.
+        InputError: the exposure is not a finite number above 0.
     """
     try:
         factor = float(exposure)
@@ -415,7 +412,7 @@ def checked_exposure(exposure: Any) -> float:
 
 
 def _share_beyond(beyond: NDArray[np.bool_]) -> float:
-    """The share of pixels of which any channel is beyond."""
+    """The fraction of pixels with at least one True channel."""
     pixels = beyond.any(axis=2) if beyond.ndim == 3 else beyond
     return float(pixels.mean())
 
@@ -426,7 +423,7 @@ def _size(values: NDArray[Any]) -> str:
 
 
 def _grey_if_one(values: NDArray[Any]) -> NDArray[Any]:
-    """A single channel is none."""
+    """Drop the axis of a single channel."""
     return values[..., 0] if values.ndim == 3 and values.shape[2] == 1 else values
 
 
@@ -448,7 +445,7 @@ def _write_exr(values: NDArray[np.float32], path: Path, text: str) -> None:
 
 
 def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
-    """Samples of a type and shape that everything behind can rely on, and their bits."""
+    """Samples of a supported type and shape, and their number of bits."""
     if samples.dtype == np.bool_:
         samples = samples.astype(np.uint8) * np.uint8(255)
     if samples.dtype.kind == "f":

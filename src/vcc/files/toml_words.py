@@ -1,4 +1,4 @@
-"""Values and messages in the syntax of camera files, TOML."""
+"""Values and messages in TOML, the syntax of camera files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 LONGEST_SHOWN = 60
-"""Characters of a value that are shown in a message."""
+"""Maximum number of characters of a value in a message."""
 
 _TRUTH = re.compile(r"\b([a-z]\w*)=(True|False)\b")
 _QUANTITY = re.compile(r"\b([a-z]\w*)=(-?[\d.]+(?:e[-+]?\d+)?) \* ([a-z]+)\b")
@@ -16,20 +16,20 @@ _NUMBER = re.compile(r"\b([a-z]\w*)=(-?\d[\d.]*(?:e[-+]?\d+)?)(?![\w*])")
 
 
 def in_toml(value: Any) -> str:
-    """A value that TOML can hold, as TOML writes it on one line; no longer than `LONGEST_SHOWN`.
+    """A value on one line as TOML writes it, cut to `LONGEST_SHOWN` characters.
 
     Args:
-        value: text, a number, a truth value, a date, a list or a table of such.
+        value: text, a number, a boolean, a date, a list or a table of these.
     """
     words = _written(value)
     return words if len(words) <= LONGEST_SHOWN else f"{words[:LONGEST_SHOWN]}…"
 
 
 def as_toml(message: str) -> str:
-    """A message of the library in the syntax of TOML: ``normalise=True`` is ``normalise = true`` there.
+    """Convert a message of the library to TOML syntax: ``normalise=True`` becomes ``normalise = true``.
 
     Args:
-        message: with ways out as Python writes them: ``width=30 * mm``, ``pitch=1e-3``, ``offset=(0, 1)``.
+        message: a message with Python arguments: ``width=30 * mm``, ``pitch=1e-3``, ``offset=(0, 1)``.
     """
     message = _TRUTH.sub(lambda found: f"{found[1]} = {found[2].lower()}", message)
     message = _QUANTITY.sub(r'\1 = "\2 \3"', message)

@@ -1,7 +1,7 @@
 """sRGB to linear light and back, IEC 61966-2-1: the exact piecewise curve, not a power of 2.2.
 
-Stored samples of 8 or 16 bits are decoded through a table with one entry for each possible value
-(256 or 65536): as exact as the formula, and much faster.
+Stored samples of 8 or 16 bits are decoded through a table of all 256 or 65536 values: as exact as the formula,
+and much faster.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from vcc.base.errors import InputError
 def to_linear(encoded: ArrayLike) -> NDArray[np.float32]:
     """Linear light of sRGB-encoded values, IEC 61966-2-1: both without unit, 1 = full scale.
 
-    Values below 0 follow the straight part of the curve, those above 1 the power.
+    Values below 0 follow the linear part of the curve, values above 1 the power.
 
     Args:
         encoded: numbers of any shape.
@@ -35,7 +35,7 @@ def from_linear(linear: ArrayLike) -> NDArray[np.float32]:
     """The sRGB encoding of linear light, IEC 61966-2-1: both without unit, 1 = full scale.
 
     Args:
-        linear: numbers of any shape; see `to_linear` for those outside 0 to 1.
+        linear: numbers of any shape; for values outside 0 to 1 see `to_linear`.
 
     Returns:
         float32, the same shape.
@@ -47,8 +47,7 @@ def from_linear(linear: ArrayLike) -> NDArray[np.float32]:
 
 @functools.cache
 def table(bits: int) -> NDArray[np.float32]:
-    """Linear light, 0 to 1, of each of the 2^bits sRGB code values: 256 or 65536 entries,
-    read-only.
+    """Linear light, 0 to 1, of the 2^bits sRGB code values: 256 or 65536 entries, read-only.
 
     Raises:
         InputError: bits other than 8 or 16.
@@ -60,12 +59,12 @@ def table(bits: int) -> NDArray[np.float32]:
     return entries
 
 
-_AT_ONCE = 65536  # samples or pairs: their indices, which NumPy widens to 8 bytes each, stay in the cache
+_AT_ONCE = 65536  # chunk length: the indices, which NumPy widens to 8 bytes each, stay in the cache
 
 
 @functools.cache
 def _pairs() -> NDArray[np.uint64]:
-    """The table of 8 bits for two samples at a time: two float32 for each two bytes that lie side by side."""
+    """The 8-bit table for two samples at a time: two float32 for each pair of adjacent bytes."""
     both = table(8)[np.arange(65536, dtype=np.uint16).view(np.uint8)]
     entries = both.view(np.uint64)
     entries.flags.writeable = False
@@ -73,12 +72,11 @@ def _pairs() -> NDArray[np.uint64]:
 
 
 def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDArray[np.float32]:
-    """Linear light of stored sRGB samples; floating-point samples are linear already and only
-    copied.
+    """Linear light of stored sRGB samples; floating-point samples are linear and are only copied.
 
     Args:
         samples: uint8, uint16 or floating point, any shape.
-        out: where to write, same shape; a new array if not given.
+        out: output array of the same shape; a new array if None.
 
     Returns:
         float32 of the same shape; integers give 0 to 1.
@@ -91,7 +89,7 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
     if samples.dtype.kind == "f":
         out[...] = samples
     elif samples.dtype == np.uint8 and samples.size % 2 == 0 and _are_contiguous(samples, out):
-        # Twice as fast as one by one, and the same numbers.
+        # Pairs of samples: twice as fast, with the same result.
         codes, light = samples.reshape(-1).view(np.uint16), out.reshape(-1).view(np.uint64)
         for start in range(0, len(codes), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
@@ -102,8 +100,7 @@ def decode(samples: NDArray[Any], out: NDArray[np.float32] | None = None) -> NDA
             part = slice(start, start + _AT_ONCE)
             np.take(table(16), numbers[part], out=values[part], mode="clip")
     elif samples.dtype in (np.uint8, np.uint16):
-        # Every code is inside the table, so "clip" changes nothing; it spares NumPy a buffered
-        # copy.
+        # Every code is inside the table, so "clip" changes nothing; it avoids a buffered copy in NumPy.
         np.take(table(samples.dtype.itemsize * 8), samples, out=out, mode="clip")
     else:
         raise InputError(f"sRGB samples are uint8, uint16 or floating point, not {samples.dtype}")
@@ -115,7 +112,7 @@ def _are_contiguous(*arrays: NDArray[Any]) -> bool:
 
 
 def encode(linear: NDArray[np.floating[Any]], bits: int) -> NDArray[Any]:
-    """Stored sRGB samples of linear light, clipped to 0…1 and rounded.
+    """Encode linear light as stored sRGB samples, clipped to 0…1 and rounded.
 
     Args:
         linear: any shape, 1 = full scale.

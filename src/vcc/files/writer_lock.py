@@ -1,4 +1,4 @@
-"""One writer of a thing at a time: another is told who is at it."""
+"""A lock per target: one writer at a time; other writers get an error that names the owner."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ except ImportError:  # Windows
     fcntl = None
 
 _locks: weakref.WeakValueDictionary[Path, WriterLock] = weakref.WeakValueDictionary()
-"""Those of this process, by the file that stands for them."""
+"""The locks of this process, by lock file."""
 _turns: weakref.WeakValueDictionary[Path, Any] = weakref.WeakValueDictionary()
-"""Locks for the threads of this process that write a thing as a whole, by the same file."""
+"""Locks for threads of this process that write a whole target, by lock file."""
 _one_thread = threading.Lock()
-"""Held while the above are looked at."""
+"""Held during access to the two dictionaries above."""
 
 
 class WriterLock:
-    """The right to write to a path, until it is given back, forgotten or taken by a later one of this process.
+    """Exclusive lock on a path, until released, garbage collected or replaced by a later lock of this process.
 
-    It is a lock on a file ``.NAME.lock`` beside the path, which says who holds it. The system lets go of it when
-    the process ends, however that happens, and knows of those of other containers and, over NFS, other machines.
-    Readers look at none of it. Where there are no such locks (Windows, some network disks, a folder that may not
-    be written to beside the store), writers are not told of one another.
+    The lock is on a file ``.NAME.lock`` next to the path, which names the owner. The system releases it
+    whenever the process ends, and it works across containers and, over NFS, machines. Readers ignore it. On
+    systems without such locks (Windows, some network disks, a read-only folder), writers do not exclude each
+    other.
 
     Args:
-        target: what is to be written.
+        target: the path to write.
 
     Raises:
-        InputError: another process writes it; the message says which, as far as is known.
+        InputError: another process writes the path; the message names it if known.
     """
 
     def __init__(self, target: Path) -> None:
@@ -57,22 +57,22 @@ class WriterLock:
 
     @property
     def held(self) -> bool:
-        """Whether it has not been given back or taken."""
+        """Whether the lock is still held."""
         return self._let_go.alive
 
     @property
     def patience(self) -> float:
-        """Seconds for which other machines' leftovers are let be: none where no other writer can be at work."""
+        """Seconds for which leftovers of other machines are kept: 0 if no other writer can be active."""
         return DAY if self._held is None else 0.0
 
     def give_back(self) -> None:
-        """Let others write."""
+        """Release the lock."""
         self._let_go()
 
 
 @contextmanager
 def in_turn(target: Path) -> Iterator[None]:
-    """Write a thing as a whole; other threads of this process that do so wait."""
+    """Write a whole target; other threads of this process that do so wait."""
     file = lock_of(Path(os.path.realpath(target)))
     with _one_thread:
         turn = _turns.setdefault(file, threading.RLock())
@@ -81,13 +81,13 @@ def in_turn(target: Path) -> Iterator[None]:
 
 
 def _locked(file: Path, target: Path) -> int | None:
-    """The open file that holds the lock, or None where there is none to be had."""
+    """The file descriptor that holds the lock; None if locks are not supported."""
     if fcntl is None:
         return None
     while True:
         try:
             stream = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
-        except OSError:  # what is written next says so, where that cannot be written either
+        except OSError:  # the next write reports an inaccessible folder
             return None
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -102,12 +102,12 @@ def _locked(file: Path, target: Path) -> int | None:
             os.close(stream)
             return None
         if _still(stream, file):
-            with suppress(OSError):  # the disk is full; what is written next says so
+            with suppress(OSError):  # the disk is full; the next write reports it
                 os.truncate(stream, 0)
                 since = f"{datetime.now():%Y-%m-%d %H:%M:%S}"
                 os.write(stream, f"process {os.getpid()} on {platform.node()} since {since}".encode())
             return stream
-        os.close(stream)  # who held it removed it in the meantime
+        os.close(stream)  # the previous owner removed the file in the meantime
 
 
 def _still(stream: int, file: Path) -> bool:
@@ -118,6 +118,6 @@ def _still(stream: int, file: Path) -> bool:
 
 
 def _let_go(held: int | None, file: Path, process: int) -> None:
-    if held is not None and process == os.getpid():  # a fork holds it for the process that it came from
+    if held is not None and process == os.getpid():  # after a fork, the lock belongs to the parent process
         file.unlink(missing_ok=True)
         os.close(held)

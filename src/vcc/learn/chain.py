@@ -1,10 +1,10 @@
-"""The way from values of parameters to the numbers of a plan, and from weights of these back to the parameters.
+"""The chain rule from parameters of a camera to the parameters of a plan, and back.
 
-A plan is recomputed for each value of its parameters, by choices made once (`vcc.plan.choice.decide`), so that
-its numbers are smooth functions of the parameters. The derivative to a parameter is the central difference of
-all numbers that follow it, in double precision. A plan takes milliseconds to make where what costs (textures) did
-not change. What numbers are linear in (the cells of a mask, heights of a plate) is learned by the transposes of
-these maps, all at once (`vcc.plan.following.Linear`).
+A plan is recomputed for each value of its camera's parameters, with choices made once (`vcc.plan.choice.decide`),
+so that its numbers are smooth functions of the parameters. The derivative with respect to a parameter is the
+central difference of all numbers that depend on it, in double precision. A plan takes milliseconds if its
+expensive parts (textures) did not change. For parameters on which numbers depend linearly (the cells of a mask,
+the heights of a plate), the transposes of these linear maps are used, all at once (`vcc.plan.following.Linear`).
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ Values = Mapping[str, ArrayLike]
 Numbers = dict[str, Array]
 
 STEP = 1e-5
-"""Of a change of 1 (`vcc.learn.scales`): differences are taken of light moved by a ten-thousandth of a pixel."""
+"""Step of the differences, relative to a change of 1 (`vcc.learn.scales`): it moves light by 1e-4 pixels."""
 MOST_BY_DIFFERENCES = 400
-"""Numbers that a parameter may have for its derivative to be taken by differences, two plans for each of them."""
+"""The largest size of a parameter that is differentiated by differences, which need two plans per number."""
 
 
 class Chain:
-    """A camera whose parameters change, before a light field.
+    """A camera with variable parameters, on a light field.
 
     Args:
-        train: the camera as it is when learning begins; all is chosen for it, once.
+        train: the camera when learning begins; all choices are made for it, once.
         grid: of the light field.
-        how: what was chosen of the computation; None takes the defaults.
+        how: the settings; None uses the defaults.
         names: of the parameters (`vcc.learn.parameters`).
 
     Attributes:
@@ -54,12 +54,12 @@ class Chain:
         grid: as given.
         how: as given.
         names: as given.
-        choices: by which all plans are made. A mask or a rim whose z is among the names counts as one in
-            mid-path, at the views too, so that it may leave them.
+        choices: used for all plans. If ``names`` has the z of a mask or a rim, the element is treated as one
+            between the views and the sensor, even at the plane of the views, so that it can move.
 
     Raises:
-        InputError: a parameter that there is not, or one that has no derivative here, named with the reason: it
-            moves rays against a hard edge that cuts them, its numbers do not follow it, or it is too large.
+        InputError: an unknown parameter, or one without a derivative; the message names the reason: it moves rays
+            across a hard edge, its numbers are not smooth in it, or it is too large.
     """
 
     def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
@@ -75,26 +75,27 @@ class Chain:
         self._check_edges({})
 
     def plan(self, values: Values | None = None) -> Plan:
-        """The plan for some values of the parameters.
+        """The plan for given values of the parameters.
 
         Args:
-            values: by the names of parameters, SI units; those that are left out are the train's own.
+            values: by name, SI units; parameters that are not given keep the train's values.
 
         Raises:
-            InputError: values that an element does not take, or for which the choices no longer hold.
+            InputError: invalid values, or values for which the choices no longer hold.
         """
         return self._at(values or {}).plan
 
     def followed(self, values: Values | None = None) -> dict[str, tuple[str, ...]]:
-        """For each parameter, the plan's parameters (`Plan.parameters`) with a derivative to it that is not 0.
+        """For each parameter, the plan's parameters (`Plan.parameters`) whose derivative with respect to it
+        is not 0.
 
-        Those of even functions are missing where such a function begins (`vcc.learn.verdicts.following` has them).
+        Even functions at their extremum are missing (`vcc.learn.verdicts.following` includes them).
 
         Args:
             values: as for `plan`.
 
         Raises:
-            InputError: as `pull`.
+            InputError: as for `pull`.
         """
         found, made = {}, self._at(values or {})
         for name in self.names:
@@ -110,20 +111,20 @@ class Chain:
     def pull(
         self, values: Values, cotangents: Mapping[str, ArrayLike], names: Collection[str] | None = None
     ) -> dict[str, Array]:
-        """The derivatives to the parameters of what has these derivatives to the plan's numbers.
+        """Gradients with respect to the parameters, from gradients with respect to the plan's numbers.
 
         Args:
             values: as for `plan`.
-            cotangents: derivatives to numbers of the plan, by the names of `Plan.parameters`, each of its number's
-                shape; those that are left out are 0.
-            names: of the parameters whose derivatives are wanted; None: of all.
+            cotangents: gradients with respect to the plan's numbers, by their names in `Plan.parameters`,
+                each in the shape of its number; missing ones are 0.
+            names: parameters whose gradients are wanted; None: all.
 
         Returns:
-            By the names of these parameters, float64, each of its parameter's shape.
+            By parameter name, float64, each in the parameter's shape.
 
         Raises:
-            InputError: values at which a parameter cannot be followed. Edges that cut rays were looked for when
-                the chain was made, not here.
+            InputError: values at which a parameter has no derivative. Edges that cut rays are checked when
+                the chain is made, not here.
         """
         weights = {name: np.asarray(cotangent, dtype=np.float64) for name, cotangent in cotangents.items()}
         made, found = self._at(values), {}
@@ -138,7 +139,7 @@ class Chain:
         return found
 
     def replanned(self, values: Values | None = None) -> tuple[str, ...]:
-        """What planning again would decide otherwise, in words; nothing where it would decide all as it was.
+        """The choices that planning again would change, as text; empty if none.
 
         Args:
             values: as for `plan`.
@@ -148,16 +149,16 @@ class Chain:
     # --- plans and their differences
 
     def _decided(self, train: Train) -> Choices:
-        """What is chosen of a plan; what moves along the axis may leave the plane of the views."""
+        """The choices for a plan; elements that move along the axis may leave the plane of the views."""
         moving = (parameter(self.train, name) for name in self.names if name.endswith(".z"))
         return decide(train, self.grid, self.how, [found.owned_by for found in moving], self._parts)
 
     def _computed(self, train: Train) -> Computed:
-        """The plan by these choices."""
+        """The plan with these choices."""
         return compute(train, self.grid, self.how, self.choices, self._parts)
 
     def _at(self, values: Values) -> _Made:
-        """The plan for some values, and its numbers; what costs is kept for plans nearby."""
+        """The plan for some values, and its numbers; expensive parts are kept for similar plans."""
         key = {name: np.asarray(value, dtype=np.float64).tobytes() for name, value in values.items()}
         if self._made is None or self._made.key != key:
             train = put(self.train, dict(values))
@@ -169,7 +170,7 @@ class Chain:
         return self._made
 
     def _with_step(self, values: Values, name: str, index: tuple[int, ...], step: float) -> Train | InputError:
-        """The train with one number of a parameter moved by a step; what it refuses."""
+        """The train with one number of a parameter moved by a step; the `InputError` if that is invalid."""
         here = np.array(values[name], dtype=np.float64) if name in values else read(self.train, name)
         here[index] += step
         try:
@@ -188,9 +189,10 @@ class Chain:
     def _derivative(
         self, values: Values, name: str, index: tuple[int, ...], wanted: Mapping[str, Any] | None = None
     ) -> Numbers:
-        """The derivatives of the plan's numbers to one number of a parameter; only of those that follow it.
+        """The derivatives of the plan's numbers with respect to one number of a parameter, without those that
+        are 0.
 
-        By a central difference; beside the end of what a camera allows by one of three points on this side of it.
+        A central difference; at a limit of what is valid, a one-sided difference of three points.
         """
         step = self._steps[name]
         before, behind = (self._with_step(values, name, index, side * step) for side in (-1, 1))
@@ -207,10 +209,10 @@ class Chain:
         parts = (-1.5, here), (2.0, self._plan_parameters(near, name)), (-0.5, self._plan_parameters(far, name))
         return _combined(parts, side * step, wanted)
 
-    # --- what is refused
+    # --- checks
 
     def _check_form(self, numbers: Numbers) -> None:
-        """Refuse a plan that has other numbers than the first one."""
+        """Raise an error for a plan whose numbers differ in name or shape from the first plan's."""
         form = tuple((name, value.shape) for name, value in numbers.items())
         if self._form is None:
             self._form = form
@@ -230,7 +232,7 @@ class Chain:
                 )
 
     def _check_edges(self, values: Values) -> None:
-        """Refuse parameters that move rays against hard edges that cut them."""
+        """Raise an error for parameters that move rays across hard edges inside their path."""
         core = self._at(values).plan.core
         if not isinstance(core, Rays) or not self.names:
             return
@@ -251,11 +253,11 @@ class _Made(Brief):
     """A plan for some values.
 
     Args:
-        key: the values.
-        train: with them.
+        key: the values, as bytes.
+        train: with the values.
         plan: of the train.
         numbers: of the plan.
-        linears: which of them are linear in what.
+        linears: linear maps from contents of elements to numbers.
     """
 
     key: dict[str, bytes]
@@ -265,12 +267,12 @@ class _Made(Brief):
     linears: tuple[Linear, ...]
 
     def linear(self, name: str) -> list[Linear]:
-        """By what numbers are linear in a parameter; none where they are not."""
+        """The linear maps from a parameter to numbers; empty if there is none."""
         thing, field = _held(parameter(self.train, name))
         return [linear for linear in self.linears if linear.follows(thing, field)]
 
     def pulled(self, linear: Linear, name: str, weights: Mapping[str, Array]) -> Array:
-        """What weights of numbers say of a parameter that they are linear in."""
+        """The gradient with respect to a parameter, by the transpose of a linear map to weighted numbers."""
         numbers = linear.numbers(self.plan)
         if not any(number in weights for number in numbers):
             return np.zeros(read(self.train, name).shape)
@@ -279,18 +281,18 @@ class _Made(Brief):
 
 
 def _held(found: Parameter) -> tuple[Any, str]:
-    """The thing that holds the numbers of a parameter, and in which field: a mask's are those of its cells."""
+    """The object that contains a parameter's numbers, and its field; for a mask these are its cells."""
     thing = getattr(found.holder, found.field)
     return (thing, CONTENT) if isinstance(thing, Cells) else (found.holder, found.field)
 
 
 def _combined(parts: Iterable[tuple[float, Numbers]], step: float, wanted: Mapping[str, Any] | None) -> Numbers:
-    """Σ factor · numbers / step of plans beside one another, only where they differ.
+    """Σ factor · numbers / step over neighbouring plans, for numbers that differ between them.
 
     Args:
         parts: (factor, numbers of a plan), factors of sum 0.
         step: between plans.
-        wanted: names of the numbers that count; None: all.
+        wanted: names of the numbers to return; None: all.
     """
     listed = list(parts)
     found = {}
@@ -300,7 +302,7 @@ def _combined(parts: Iterable[tuple[float, Numbers]], step: float, wanted: Mappi
         alike = [numbers[name] for _, numbers in listed]
         if all(one is first or np.array_equal(one, first) for one in alike[1:]):
             continue
-        held = np.isfinite(first)  # what is without bounds stays so
+        held = np.isfinite(first)  # infinite bounds stay infinite
         total = sum(factor * np.where(held, one, 0.0) for (factor, _), one in zip(listed, alike, strict=True))
         found[name] = np.asarray(total / step)
     return found

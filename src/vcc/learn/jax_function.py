@@ -1,4 +1,4 @@
-"""A camera as a function that JAX takes derivatives of: pictures of samples and of the camera's parameters."""
+"""A camera as a JAX function: images with gradients to samples and to the camera's parameters."""
 
 from __future__ import annotations
 
@@ -30,43 +30,43 @@ from vcc.optics.train import Train
 from vcc.plan.how import How
 
 SAMPLES = "samples"
-"""Under which samples stand among the parameters; names of these have a dot."""
+"""Key of the samples among the parameters; parameter names have a dot."""
 KINDS = ("float32", "float64", "float16", "uint8", "uint16")
-"""Types that samples may have."""
+"""Supported types of samples."""
 
 Given = dict[str, Any]
 
 
 class CameraFunction:
-    """A camera that learns, on a light field or on others of the same grid: a function for JAX.
+    """A camera with learned parameters as a JAX function, for a light field or others on the same grid.
 
-    ``function(function.values)`` is the picture that the camera makes of the light field. It works under
-    ``jax.jit``, ``jax.grad`` and ``jax.vmap`` (one picture after the other), by callbacks on the CPU. It has first
-    derivatives only, and those backwards: forward mode (``jax.jvp``, ``jax.jacfwd``, ``jax.hessian``) and
-    derivatives of a gradient are refused.
+    ``function(function.values)`` returns the camera's image of the light field. It works under ``jax.jit``,
+    ``jax.grad`` and ``jax.vmap`` (one image after another), with callbacks on the CPU. Only first derivatives in
+    reverse mode are supported: forward mode (``jax.jvp``, ``jax.jacfwd``, ``jax.hessian``) and derivatives of a
+    gradient raise an error.
 
-    Each parameter is in multiples of a scale of its own (`vcc.learn.scales`, to the nearest power of two, so that
-    nothing is rounded by it): one learning rate then serves all. In single precision, as JAX has them unless
-    ``jax_enable_x64`` is set, what is learned is rounded to 6e-8 of itself: a focal length or a place along the
-    axis to less than what moves light by a ten-thousandth of a pixel.
+    Each parameter is a multiple of its own scale (`vcc.learn.scales`, rounded to a power of two, so that
+    scaling is exact): one learning rate then suits all. In single precision, JAX's default without
+    ``jax_enable_x64``, parameters are rounded to a relative 6e-8: for a focal length or a position along the
+    axis, this moves light by less than 1e-4 pixels.
 
-    What is decided by the camera with which learning begins (footprints or rays, how finely masks are sampled,
-    what fills gaps between views) stays so while it learns; `explain` says when planning again would decide
-    otherwise.
+    Choices that depend on the initial camera (footprints or rays, mask sampling, interpolation between views) stay
+    fixed during learning; `explain` reports whether planning again would change them.
 
     Args:
-        camera: as it is when learning begins.
-        light_field: at its entrance plane, in memory or on disk.
+        camera: the initial camera.
+        light_field: at the camera's entrance plane, in memory or on disk.
         learn: names of parameters (`vcc.learn.parameters`), such as ``["code.pattern", "main.focal_length",
-            "sensor.z"]``; none where gradients to samples are all that is wanted. Electronics, which pictures do
-            not depend on, are learned with PyTorch.
-        how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose pictures are float64
+            "sensor.z"]``; empty if only gradients to samples are wanted. Parameters of the electronics, which do
+            not affect images, are learned with PyTorch.
+        how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose images are float64
+            if JAX supports it.
             where JAX has it.
         options: as in `vcc.Camera.capture`.
 
     Raises:
-        InputError: a parameter that does not exist or cannot be learned here (named, with the reason), an engine
-            or a tolerance that cannot be gone through backwards.
+        InputError: a parameter that does not exist or cannot be learned here (the message gives the reason), an
+            engine or a tolerance without derivatives.
     """
 
     def __init__(
@@ -88,7 +88,7 @@ class CameraFunction:
         self._work = Work.of(camera, light_field, by_an_engine(How.of(how, options)), names)
         self._scales = {name: kept_in(camera, name) for name in names}
         self._shapes = {name: read(camera, name).shape for name in names}
-        # Callbacks come from several threads, and plans share what they are made of.
+        # Callbacks come from several threads, and plans share their parts.
         self._alone = threading.Lock()
         self._pictures = jax.custom_vjp(self._ahead)
         self._pictures.defvjp(self._kept, self._back, symbolic_zeros=True)
@@ -97,34 +97,34 @@ class CameraFunction:
 
     @property
     def values(self) -> dict[str, jax.Array]:
-        """The camera's own parameters as learning begins, in multiples of `scales`, by name: what is optimised."""
+        """The initial values of the parameters, in multiples of `scales`, by name: start the optimisation here."""
         return {name: jnp.asarray(read(self._work.camera, name) / scale) for name, scale in self._scales.items()}
 
     @property
     def scales(self) -> dict[str, float]:
-        """What each parameter is in multiples of, SI units: ``values[name] * scales[name]`` is in metres."""
+        """The scale of each parameter, SI units: ``values[name] * scales[name]`` is in metres, for example."""
         return dict(self._scales)
 
     def __call__(self, values: Mapping[str, Any], samples: Any = None) -> jax.Array:
-        """The picture of the light field, or of others on its grid.
+        """The image of the light field, or of others on its grid.
 
         Args:
-            values: of all parameters that are learned, in multiples of `scales`, floating point: each of its
-                parameter's shape, or with one axis in front for as many pictures, such as (n, rows, columns) for n
-                masks on one light field.
+            values: all learned parameters, in multiples of `scales`, floating point: each in the parameter's
+                shape, or with one leading axis for several images, such as (n, rows, columns) for n masks on
+                one light field.
             samples: of other light fields of the same shape and geometry: (…, v, u, t, s[, channels]), floating
-                point (radiance) or unsigned integers (shares of their largest value); None takes the light field's
-                own.
+                point (radiance) or unsigned integers (shares of their largest value); None uses the samples of the
+                light field.
 
         Returns:
-            Irradiance as light lands on the sensor, (…, rows, columns[, channels]), float32 (float64 by
-            ``"reference"`` where JAX has it), as `vcc.Camera.capture` gives it. The axes of ``values`` stand
-            before those of ``samples``.
+            Irradiance on the sensor, inverted as it lands, (…, rows, columns[, channels]), float32 (float64 with
+            ``"reference"`` if JAX supports it), as `vcc.Camera.capture` returns it. The axes of ``values`` precede
+            those of ``samples``.
 
         Raises:
-            InputError: names, shapes or types of values or samples. What is found when the picture is made (a
-                parameter that is not finite or that its element does not take, named; samples that are not
-                finite) is within an error of JAX's, its last line.
+            InputError: wrong names, shapes or types of values or samples. Errors found only when the image is
+                computed (a parameter that is not finite or invalid for its element; samples that are not
+                finite) are in the last line of an error of JAX.
         """
         given = _as_values(values, self._shapes)
         if samples is not None:
@@ -133,25 +133,25 @@ class CameraFunction:
         return self._pictures(given)
 
     def camera(self, values: Mapping[str, Any]) -> Train:
-        """The camera with what was learned, which saves to TOML: ``function.camera(values).save("learned.toml")``.
+        """The camera with learned values; it saves to TOML: ``function.camera(values).save("learned.toml")``.
 
         Args:
-            values: as for a picture, one of each.
+            values: as for an image, one of each.
 
         Raises:
-            InputError: names or shapes of values; a parameter that is not finite or that its element does not
-                take, named; values that JAX traces.
+            InputError: wrong names or shapes of values; a parameter that is not finite or invalid for its element;
+                values traced by JAX.
         """
         return put(self._work.camera, self._known(values))
 
     def explain(self, values: Mapping[str, Any]) -> str:
-        """The plan in words, and what planning again with what was learned would decide otherwise.
+        """The plan as text, and the choices that planning again with the learned values would change.
 
         Args:
-            values: as for a picture, one of each.
+            values: as for an image, one of each.
 
         Raises:
-            InputError: as `camera`.
+            InputError: as for `camera`.
         """
         again = "CameraFunction(function.camera(values), …)"
         return explained_while_learning(self._work, self._known(values), self._scales, again)
@@ -162,9 +162,9 @@ class CameraFunction:
 
     def __reduce__(self) -> tuple[Any, ...]:
         work = self._work
-        return CameraFunction, (work.camera, work.light_field, work.chain.names, work.how)  # decided alike there
+        return CameraFunction, (work.camera, work.light_field, work.chain.names, work.how)  # same choices
 
-    # --- what JAX traces ---
+    # --- traced by JAX ---
 
     def _ahead(self, given: Given) -> Any:
         several = self._several(given)
@@ -178,7 +178,7 @@ class CameraFunction:
         return jax.pure_callback(self._made, picture, given, vmap_method="sequential")
 
     def _kept(self, perturbed: Given) -> tuple[Any, Any]:
-        """A picture, and what the way back needs: all that is given, and the names of that with derivatives."""
+        """An image, and the data for the reverse pass: all inputs, and the names of those with derivatives."""
         given = {name: each.value for name, each in perturbed.items()}
         wanted = [name for name, each in perturbed.items() if each.perturbed]
         return self._pictures(given), (given, dict.fromkeys(wanted))
@@ -195,7 +195,7 @@ class CameraFunction:
     def _several(self, given: Given) -> set[str]:
         return several_of({name: given[name].shape for name in self._shapes}, self._shapes)
 
-    # --- what is called back ---
+    # --- callbacks ---
 
     def _made(self, given: Given) -> NDArray[np.floating]:
         samples, numbers = self._parted(given)
@@ -210,7 +210,7 @@ class CameraFunction:
             call.begin(samples, numbers)
             of_samples, pulled = call.back(weights, SAMPLES in wanted, parameters, numbers)
             if not all(np.isfinite(each).all() for each in pulled.values()):
-                call.refuse()  # no picture was made that would have told, where a loss is linear in it
+                call.refuse()  # for a loss linear in it no image was made
         found = {name: pulled[name] * self._scales[name] for name in parameters}
         if SAMPLES in wanted:
             found[SAMPLES] = of_samples
@@ -220,14 +220,14 @@ class CameraFunction:
         }
 
     def _parted(self, given: Given) -> tuple[NDArray[Any] | None, dict[str, NDArray[np.float64]]]:
-        """Samples, and numbers of parameters in SI units."""
+        """Samples, and parameters in SI units."""
         samples = np.asarray(given[SAMPLES]) if SAMPLES in given else None
         return samples, {
             name: np.asarray(given[name], dtype=np.float64) * scale for name, scale in self._scales.items()
         }
 
     def _known(self, values: Mapping[str, Any]) -> dict[str, NDArray[np.float64]]:
-        """Numbers in SI units of values that are not traced."""
+        """Parameters in SI units, from values that are not traced."""
         given = _as_values(values, self._shapes)
         for name, value in given.items():
             if isinstance(value, jax.core.Tracer):
@@ -245,11 +245,11 @@ def _refuse_second(kept: Any, weights: Any) -> Any:
     )
 
 
-# --- what is given ---
+# --- inputs ---
 
 
 def _as_values(values: Any, shapes: Mapping[str, tuple[int, ...]]) -> Given:
-    """Values of all parameters by name, as arrays of JAX."""
+    """Values of all parameters by name, as JAX arrays."""
     if not isinstance(values, Mapping):
         raise InputError(
             f"values are a dict of arrays by the names of parameters, function.values, not {type(values).__name__}"
@@ -266,7 +266,7 @@ def _as_values(values: Any, shapes: Mapping[str, tuple[int, ...]]) -> Given:
 
 
 def _as_array(what: str, value: Any) -> Any:
-    """Floating point as an array of JAX."""
+    """A floating-point value as a JAX array."""
     try:
         array = jnp.asarray(value)
     except (TypeError, ValueError) as error:
@@ -277,7 +277,7 @@ def _as_array(what: str, value: Any) -> Any:
 
 
 def _as_samples(samples: Any) -> Any:
-    """Samples of a type that light fields have, as an array of JAX."""
+    """Samples of a supported type, as a JAX array."""
     try:
         array = jnp.asarray(samples)
     except (TypeError, ValueError) as error:

@@ -1,12 +1,12 @@
-"""The parameters of a camera by name: what can be learned, read from a train and put back into it.
+"""The parameters of a camera by name: read from a train, changed in a train.
 
-A name is the element's and then what leads to the number within it: ``"main.focal_length"``, ``"code.pattern"``
-(the cells of a mask), ``"code.pattern.period"``, ``"plate.surface.coefficients"``, ``"sensor.z"``. An element
-without a name goes by its kind (``"lens"``, ``"lens_array"``) where it is the only one of that kind that has none.
+A name is the element's name and the path to the number within the element: ``"main.focal_length"``,
+``"code.pattern"`` (the cells of a mask), ``"code.pattern.period"``, ``"plate.surface.coefficients"``,
+``"sensor.z"``. An element without a name is called by its kind (``"lens"``, ``"lens_array"``) if it is the only
+unnamed one of that kind.
 
-Parameters are numbers of floating point, alone or in tuples and arrays, in SI units. Whole numbers, words and
-seeds are none; `place` and `replaced` know these by name too, and the things that hold others, such as a mask's
-pattern: what a sweep goes through.
+Parameters are floating-point numbers, alone or in tuples and arrays, in SI units. Integers, text and seeds are not
+parameters. `place` and `replaced`, which sweeps use, accept these too, and objects such as a mask's pattern.
 """
 
 from __future__ import annotations
@@ -34,31 +34,31 @@ Array = NDArray[np.float64]
 AnyTrain = TypeVar("AnyTrain", bound=Train)
 
 SENSOR = "sensor"
-"""The name under which the sensor's parameters stand."""
+"""The name of the sensor in parameter names."""
 FEW = 3
-"""Parameters that an error still names one by one."""
+"""The largest number of parameters that an error lists one by one."""
 TOGETHER: dict[tuple[type, str], str] = {
     (Samples, "values"): "shares that sum to 1",
     (Radial, "profile"): "a density whose integral is 1",
     (Radial, "radii"): "radii from 0 on of a density whose integral is 1",
     (CodedDiffuser, "weights"): "shares that sum to 1",
 }
-"""Fields of numbers of which none can change alone, and what they are."""
+"""Fields whose numbers cannot change independently, with the constraint."""
 CONTENT = "values"
-"""The field that holds what a thing is made of: its array goes by the name of the thing itself."""
+"""The field with an object's main array: the array is named like the object itself."""
 
 
 @dataclass(frozen=True, eq=False)
 class Parameter:
-    """Where a parameter stands.
+    """A parameter and its place in the camera.
 
     Args:
-        name: of the parameter, the element's in front.
+        name: of the parameter, beginning with the element's.
         owner: the element, or the sensor.
-        holder: the dataclass whose field it is: the owner, or a thing in one of its fields.
+        holder: the dataclass with the field: the owner, or an object within it.
         field: of the holder.
-        steps: names of fields and places in tuples that lead from the owner to it.
-        value: as it stands there.
+        steps: field names and tuple indices that lead from the owner to the parameter.
+        value: its value there.
     """
 
     name: str
@@ -70,52 +70,51 @@ class Parameter:
 
     @property
     def owned_by(self) -> str:
-        """What messages call the owner."""
+        """The owner's name in messages."""
         return "the sensor" if isinstance(self.owner, Sensor) else self.owner.label
 
     def array(self) -> Array:
-        """The numbers, float64, of the shape in which they are learned."""
+        """The numbers, float64, in the shape in which they are learned."""
         return np.array(self.value, dtype=np.float64)
 
 
 def names(train: Train) -> tuple[str, ...]:
-    """All parameters of a camera that are numbers of floating point, elements in order, the sensor's last.
+    """The names of all floating-point parameters of a camera, elements in order, the sensor's last.
 
     Args:
-        train: the camera. Of elements that cannot be told apart, none are listed.
+        train: the camera. Elements that share a kind and have no names are not listed.
     """
     return tuple(name for name, found in _listed(train).items() if why_none(found) is None)
 
 
 def parameter(train: Train, name: str) -> Parameter:
-    """Where a parameter stands.
+    """Find a parameter by name.
 
     Raises:
-        InputError: there is none of that name (those that there are are listed), or it is no number that can be
-            learned.
+        InputError: an unknown name (the message lists the known ones), or a parameter that cannot be learned.
     """
     return _learned(train, _listed(train), name)
 
 
 def read(train: Train, name: str) -> Array:
-    """The numbers of a parameter as they are, SI units, float64, an array of their own; () for one number.
+    """The numbers of a parameter, SI units, float64, a new array; shape () for a single number.
 
     Raises:
-        InputError: as `parameter`.
+        InputError: as for `parameter`.
     """
     return parameter(train, name).array()
 
 
 def put(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
-    """The same camera with some parameters changed, all at once; it is made as a user makes it, and checked so.
+    """A camera with some parameters changed, all at once; it is validated like any new camera.
 
     Args:
-        train: the camera; what comes back is of its class.
-        values: numbers by the names of parameters, SI units, each of its parameter's shape.
+        train: the camera; the result has its class.
+        values: by parameter name, SI units, each in its parameter's shape.
 
     Raises:
-        InputError: as `parameter`; another shape; numbers that are not finite, or that the element does not take,
-            named by parameter and element.
+        InputError: as for `parameter`; a wrong shape; numbers that are not finite, or invalid for the element. The
+            message names parameter and element.
     """
     listed = _listed(train)
     found = [_learned(train, listed, name) for name in values]
@@ -123,10 +122,10 @@ def put(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
 
 
 def with_values(train: AnyTrain, values: Sequence[tuple[Parameter, Any]]) -> AnyTrain:
-    """A camera with other values in places that were found in it, by `place` or `parameter`.
+    """A camera with other values at places found by `place` or `parameter`.
 
     Raises:
-        InputError: what an element does not take, named by parameter and element.
+        InputError: a value that is invalid for the element; the message names parameter and element.
     """
     changes: dict[int, dict[Any, Any]] = {}
     for found, value in values:
@@ -141,16 +140,16 @@ def with_values(train: AnyTrain, values: Sequence[tuple[Parameter, Any]]) -> Any
 
 
 def place(train: Train, name: str, value: Any = None) -> Parameter:
-    """Where anything stands that a camera can be made with: numbers, words, choices, patterns, electronics.
+    """Find any constructor argument of a camera by name: numbers, text, options, patterns, electronics.
 
     Args:
         train: the camera.
-        name: as of parameters; what holds others goes by its own: ``"code.pattern"``, ``"sensor.electronics"``.
-        value: what is to stand there. Where cells of a pattern go by the pattern's name, an array means these, and
-            anything else the pattern.
+        name: a parameter name, or the name of an object: ``"code.pattern"``, ``"sensor.electronics"``.
+        value: the intended value. If a pattern and its cells have the same name, an array refers to the cells, and
+            any other value to the pattern.
 
     Raises:
-        InputError: there is nothing of that name; those that there are are listed.
+        InputError: an unknown name; the message lists the known ones.
     """
     listed = _listed(train)
     things = {found.name: found for found in _found(train, things=True)}
@@ -161,25 +160,25 @@ def place(train: Train, name: str, value: Any = None) -> Parameter:
 
 
 def replaced(train: AnyTrain, values: Mapping[str, Any]) -> AnyTrain:
-    """The same camera with something else in some places, all at once; it is made and checked as a user makes it.
+    """A camera with some values replaced, all at once; it is validated like any new camera.
 
     Args:
-        train: the camera; what comes back is of its class.
-        values: by the names of `place`, as elements and sensor take them: SI units.
+        train: the camera; the result has its class.
+        values: by the names of `place`, as elements and sensor accept them: SI units.
 
     Raises:
-        InputError: as `place`; what an element does not take, named by parameter and element; one name within
-            another.
+        InputError: as for `place`; a value that is invalid for the element, with parameter and element in the
+            message; one name within another.
     """
     check_apart(values)
     return with_values(train, [(place(train, name, value), value) for name, value in values.items()])
 
 
 def check_apart(names: Collection[str]) -> None:
-    """Refuse names of which one is a part of another.
+    """Check that no name is part of another.
 
     Raises:
-        InputError: there are such.
+        InputError: one name is part of another.
     """
     for name in names:
         within = [other for other in names if other.startswith((f"{name}.", f"{name}["))]
@@ -188,7 +187,7 @@ def check_apart(names: Collection[str]) -> None:
 
 
 def why_none(found: Parameter) -> str | None:
-    """Why what stands at a place is no parameter, in words; None where it is one."""
+    """The reason why the value at a place is not a parameter, as text; None if it is one."""
     value = found.value
     if value is None:
         return "left out (None)"
@@ -210,7 +209,7 @@ def why_none(found: Parameter) -> str | None:
 
 
 def takes_fractions(found: Parameter) -> bool:
-    """Whether a field in which whole numbers stand is there for others too, as far as its type says."""
+    """Whether a field that contains integers also accepts fractions, according to its type."""
     said = str(next(field.type for field in dataclasses.fields(found.holder) if field.name == found.field))
     return any(kind in said for kind in ("float", "Array"))  # ArrayLike, NDArray
 
@@ -219,10 +218,10 @@ def takes_fractions(found: Parameter) -> bool:
 
 
 def keys(train: Train) -> dict[str, Element | Sensor]:
-    """The elements and the sensor by the names under which their parameters stand.
+    """The elements and the sensor, by the names with which their parameters begin.
 
     Args:
-        train: elements that have no name, and are not the only such ones of their kind, are left out.
+        train: unnamed elements that are not the only ones of their kind are omitted.
     """
     unnamed = [element.kind for element in train.elements if not element.name]
     found: dict[str, Element | Sensor] = {}
@@ -230,7 +229,7 @@ def keys(train: Train) -> dict[str, Element | Sensor]:
         kind = element.kind.replace(" ", "_")
         if element.name or unnamed.count(element.kind) == 1:
             found.setdefault(element.name or kind, element)
-    # An element that is named as another's kind, or as the sensor, goes by its name: that was chosen.
+    # A name chosen by the user has priority over a kind or "sensor".
     for element in train.elements:
         if element.name:
             found[element.name] = element
@@ -239,7 +238,7 @@ def keys(train: Train) -> dict[str, Element | Sensor]:
 
 
 def _learned(train: Train, listed: Mapping[str, Parameter], name: str) -> Parameter:
-    """One of what is listed; see `parameter` for what is refused."""
+    """The parameter of a name among ``listed``; see `parameter` for the errors."""
     if name not in listed:
         raise InputError(f"there is no parameter {name!r}{_instead(train, name, names(train))}")
     found = listed[name]
@@ -249,7 +248,7 @@ def _learned(train: Train, listed: Mapping[str, Parameter], name: str) -> Parame
 
 
 def _instead(train: Train, name: str, there_are: Sequence[str]) -> str:
-    """What to write where there is no parameter of a name, and there are others."""
+    """The hint of a message about an unknown name: similar names, or those that exist."""
     element, _, rest = name.partition(".")
     alike = [each for each in train.elements if not each.name and each.kind.replace(" ", "_") == element]
     if len(alike) > 1:
@@ -267,12 +266,12 @@ def _instead(train: Train, name: str, there_are: Sequence[str]) -> str:
 
 
 def _listed(train: Train) -> dict[str, Parameter]:
-    """All that stands in the fields of elements and sensor, numbers or not, by name."""
+    """All fields of elements and sensor, numbers or not, by name."""
     return {found.name: found for found in _found(train)}
 
 
 def _found(train: Train, things: bool = False) -> Iterator[Parameter]:
-    """What stands in the fields of elements and sensor, and, if asked, the things that hold others first."""
+    """All fields of elements and sensor; with ``things``, objects with fields of their own come first."""
     for key, owner in keys(train).items():
         held: set[str] = set()
         for found in _within(owner, key, owner, ()):
@@ -283,7 +282,7 @@ def _found(train: Train, things: bool = False) -> Iterator[Parameter]:
 
 
 def _within(owner: Element | Sensor, name: str, thing: Any, steps: tuple[str | int, ...]) -> Iterator[Parameter]:
-    """What stands in the fields of a dataclass, then in those of the things in them."""
+    """The fields of a dataclass, then those of the objects within them."""
     for field in dataclasses.fields(thing):
         value = getattr(thing, field.name)
         if not field.init or field.name in ("name", "source"):
@@ -306,12 +305,12 @@ def _is_thing(value: Any) -> bool:
 
 
 def _holds_others(value: Any) -> bool:
-    """Whether a value is a thing with fields, or a list of such."""
+    """Whether a value is an object with fields, or a tuple with such objects."""
     return _is_thing(value) or (isinstance(value, tuple) and any(dataclasses.is_dataclass(part) for part in value))
 
 
 def _is_plain_mask(thing: Any) -> bool:
-    """Whether a mask was given as an array and its own width: then these are its parameters."""
+    """Whether a mask was given as an array and a width: these are then its parameters."""
     if not (isinstance(thing, Mask) and isinstance(thing.pattern, Cells) and thing.width is not None):
         return False
     cells = thing.pattern
@@ -319,11 +318,11 @@ def _is_plain_mask(thing: Any) -> bool:
     return (cells.width, cells.height, cells.middle) == (thing.width, height, (0.0, 0.0))
 
 
-# --- putting ---
+# --- changing ---
 
 
 def _checked(found: Parameter, value: Any) -> Any:
-    """Numbers for a parameter: of its shape and finite, in the form in which its field holds them."""
+    """Numbers for a parameter, checked for shape and finiteness, in the type of its field."""
     now = found.array()
     numbers = np.asarray(value, dtype=np.float64)
     if numbers.shape != now.shape:
@@ -354,19 +353,19 @@ def _is_transmission(found: Parameter) -> bool:
 
 
 def _as_tuple(numbers: Any) -> Any:
-    """Lists within lists as tuples; a number stays one."""
+    """Convert nested lists to tuples; a number stays a number."""
     return tuple(_as_tuple(part) for part in numbers) if isinstance(numbers, list) else numbers
 
 
 def _changed(thing: Any, changes: Mapping[Any, Any]) -> Any:
-    """An object recomputed with changed fields."""
+    """An object with changed fields."""
     if not changes:
         return thing
     if isinstance(thing, tuple):
         return tuple(_changed(part, changes[n]) if n in changes else part for n, part in enumerate(thing))
     plain = {"pattern": thing.pattern.values} if _is_plain_mask(thing) else {}
     if "pattern" in changes and hasattr(thing, "source"):
-        plain = {"source": ""}  # which is no longer where the pattern comes from
+        plain = {"source": ""}  # the pattern no longer comes from this file
     made = {
         step: _changed(getattr(thing, step), change) if isinstance(change, dict) else change
         for step, change in changes.items()

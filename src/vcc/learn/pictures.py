@@ -1,6 +1,6 @@
-"""Pictures by cameras whose parameters change: one plan or several, run ahead and back, in NumPy's arrays.
+"""Images by cameras with variable parameters: one plan or several, forward and backward, on NumPy arrays.
 
-What libraries that take derivatives are built on, each in modules of its own: nothing here knows of them.
+The modules for PyTorch and JAX build on this one; it does not depend on them.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ Numbers = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """What pictures are made with that stays as it is while a camera learns; copies of a module share it.
+    """The fixed part of a learning task; copies of a module share it.
 
     Args:
-        camera: with which learning, or the last planning, began.
-        light_field: whose pictures are made where no other samples are given.
-        how: as chosen.
+        camera: at the last planning, or when learning began.
+        light_field: used if no other samples are given.
+        how: the settings.
         chain: from parameters to plans and back.
-        followed: the numbers of the plan that follow each parameter.
+        followed: the numbers of the plan that depend on each parameter.
     """
 
     camera: Train
@@ -54,11 +54,11 @@ class Work:
 
     @classmethod
     def of(cls, camera: Train, light_field: Samples, how: How, names: Sequence[str]) -> Work:
-        """All is decided, once, for the camera as it is.
+        """Make all choices, once, for the camera as it is.
 
         Raises:
-            InputError: a light field of another library's arrays, a parameter that cannot be learned, a plan that
-                cannot be gone through backwards.
+            InputError: a light field in another library's arrays, a parameter that cannot be learned, a plan
+                without derivatives.
         """
         whole = light_field.whole()
         if whole is not None and not isinstance(whole, np.ndarray):
@@ -71,13 +71,13 @@ class Work:
         return cls(camera, light_field, how, chain, {name: following(chain, name) for name in names})
 
     def planned_for(self) -> dict[str, str]:
-        """What was planned for, a short hash each: equal ones give equal plans, but for the seed of rays.
+        """Short hashes of the planner's inputs: equal hashes give equal plans, except for the seed of rays.
 
-        An empty text stands for what tells nothing of its content, such as a function of Python.
+        Empty text stands for an input without a comparable content, such as a Python function.
         """
         grid, how = self.light_field.grid, self.how
         disparities = None if how.scene_distance is not None else grid.measured_disparity_range()
-        # Rounded: other machines may measure disparities otherwise in the last digits.
+        # Rounded: estimates of disparity differ in the last digits between machines.
         seen = disparities and [round(float(each), 3) for each in disparities]
         decisive = [field.name for field in fields(How) if field.name not in (*OF_THE_RUN, "seed")]
         return {
@@ -88,14 +88,14 @@ class Work:
 
     @property
     def picture_shape(self) -> tuple[int, ...]:
-        """(rows, columns[, channels]) of a picture."""
+        """(rows, columns[, channels]) of an image."""
         return *self.camera.sensor.shape, *self.light_field.grid.shape[4:]
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Work:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Work.of, (self.camera, self.light_field, self.how, self.chain.names)  # all is decided alike there
+        return Work.of, (self.camera, self.light_field, self.how, self.chain.names)  # makes the same choices
 
 
 def _reported(*parts: Any) -> str:
@@ -106,10 +106,10 @@ def _reported(*parts: Any) -> str:
 
 
 def listed(learn: Any) -> tuple[str, ...]:
-    """Names of parameters, as they are given to be learned.
+    """Check the names of the parameters to learn, and return them as a tuple.
 
     Raises:
-        InputError: text alone, what is no name, a name twice.
+        InputError: a single text, an item that is not text, a repeated name.
     """
     if isinstance(learn, str):
         raise InputError(f'learn is a list of names: write learn=["{learn}"]')
@@ -123,14 +123,14 @@ def listed(learn: Any) -> tuple[str, ...]:
 
 
 def several_of(given: Mapping[str, tuple[int, ...]], own: Mapping[str, tuple[int, ...]]) -> set[str]:
-    """Which parameters are given for many pictures, with one axis more in front than their own.
+    """The parameters with values for several images, which have one leading axis more than the parameter.
 
     Args:
-        given: shapes of numbers, by parameter.
+        given: shapes of values, by parameter.
         own: shapes of the parameters.
 
     Raises:
-        InputError: they have neither shape, or are for different numbers of pictures.
+        InputError: a wrong shape, or different numbers of images.
     """
     for name, shape in given.items():
         lead = len(shape) - len(own[name])
@@ -147,10 +147,10 @@ def several_of(given: Mapping[str, tuple[int, ...]], own: Mapping[str, tuple[int
 
 
 def check_samples(shape: tuple[int, ...], grid: Grid) -> None:
-    """Refuse samples that are not those of light fields on a grid, with any number of axes in front.
+    """Check that samples have the shape of a grid, with any number of leading axes.
 
     Raises:
-        InputError: they have another shape, or there are none.
+        InputError: a wrong shape, or no samples.
     """
     if shape[-len(grid.shape) :] != grid.shape:
         raise InputError(
@@ -162,10 +162,10 @@ def check_samples(shape: tuple[int, ...], grid: Grid) -> None:
 
 
 def by_an_engine(how: How) -> How:
-    """What was chosen, by an engine that goes backwards to parameters: ``"numba"`` where none was.
+    """The settings with an engine that supports gradients to parameters: ``"numba"`` if none was set.
 
     Raises:
-        InputError: ``"array_api"`` or ``"cuda"`` was.
+        InputError: the engine is ``"array_api"`` or ``"cuda"``.
     """
     name = how.engine or chosen(None, None)
     if why := abilities(name).no_learning:
@@ -174,21 +174,21 @@ def by_an_engine(how: How) -> How:
 
 
 def kept_in(train: Train, name: str) -> float:
-    """What numbers of a parameter are kept in multiples of while it learns: its scale, to a power of two.
+    """The unit in which a parameter is stored during learning: its scale, rounded to a power of two.
 
-    So that nothing is rounded by it.
+    A power of two makes scaling exact.
     """
     return float(2.0 ** round(math.log2(scale(train, name))))
 
 
 def explained_while_learning(work: Work, arrays: Numbers, scales: Mapping[str, float], plan_again: str) -> str:
-    """The plan in words, what is learned, and what planning again would decide otherwise.
+    """The plan as text, the learned parameters, and the choices that planning again would change.
 
     Args:
         work: camera and light field.
-        arrays: numbers of all that is learned, SI units.
-        scales: what they are kept in multiples of, by name.
-        plan_again: how to do that, in code.
+        arrays: all learned parameters, SI units.
+        scales: their units of storage, by name.
+        plan_again: the code with which a user plans again.
     """
     in_pictures = {name: arrays[name] for name in work.chain.names}
     plan = work.chain.plan(in_pictures)
@@ -207,12 +207,12 @@ def explained_while_learning(work: Work, arrays: Numbers, scales: Mapping[str, f
 
 
 class Call:
-    """Pictures by one plan or several, and what the way back needs of them.
+    """Images by one plan or several, and the data for their reverse pass.
 
     Args:
         work: camera and light field.
-        names: of the parameters, in the order in which their numbers are given.
-        several: those whose numbers have an axis of cameras in front.
+        names: of the parameters, in the order of their numbers.
+        several: the parameters whose numbers have a leading axis of cameras.
     """
 
     def __init__(self, work: Work, names: tuple[str, ...], several: Collection[str]) -> None:
@@ -220,17 +220,17 @@ class Call:
         self.ahead: list[list[tuple[Drive, Partial | None]]] = []  # by light field and camera
 
     def made(self, samples: NDArray[Any] | None, numbers: Numbers) -> NDArray[np.floating]:
-        """The pictures of one or several light fields by one or several cameras.
+        """The images of one or several light fields by one or several cameras.
 
         Args:
-            samples: (…, v, u, t, s[, channels]); None for the light field's own.
+            samples: (…, v, u, t, s[, channels]); None for the samples of the light field.
             numbers: of all parameters.
 
         Returns:
             (…, rows, columns[, channels]), the axis of cameras before those of the light fields.
 
         Raises:
-            InputError: numbers that an element does not take, samples that are not finite.
+            InputError: numbers that are invalid for an element, samples that are not finite.
         """
         self.begin(samples, numbers)
         found = np.stack([self._pictures(n) for n in range(len(self.ahead))], axis=1)
@@ -239,14 +239,14 @@ class Call:
         return found.reshape(*cameras, *lead, *found.shape[2:])
 
     def begin(self, samples: NDArray[Any] | None, numbers: Numbers) -> None:
-        """Make the plans: enough for the way back where the pictures were made by another call.
+        """Make the plans; this suffices for the reverse pass if another call made the images.
 
         Args:
             samples: as for `made`.
-            numbers: likewise.
+            numbers: as for `made`.
 
         Raises:
-            InputError: numbers that an element does not take.
+            InputError: numbers that are invalid for an element.
         """
         work = self.work
         plans = [work.chain.plan(one) for one in self._cameras(numbers)]
@@ -257,7 +257,7 @@ class Call:
         self.ahead = [[(Drive.of_linear(plan, one, work.how), None) for plan in plans] for one in fields]
 
     def _cameras(self, numbers: Numbers) -> list[dict[str, NDArray[np.float64]]]:
-        """The numbers of each camera; of one where no number has an axis of them."""
+        """The numbers of each camera; of a single camera if no number has an axis of cameras."""
         count = len(numbers[next(iter(self.several))]) if self.several else 1
         return [
             {name: value[n] if name in self.several else value for name, value in numbers.items()}
@@ -265,7 +265,7 @@ class Call:
         ]
 
     def _pictures(self, n: int) -> NDArray[np.floating]:
-        """The pictures of a light field by several plans, which read it once where they can."""
+        """The images of a light field by several plans, which share the reading of samples if possible."""
         drives = [drive for drive, _ in self.ahead[n]]
         found = rasters_each(drives)
         self.ahead[n] = list(zip(drives, found, strict=True))
@@ -275,7 +275,7 @@ class Call:
         return pictures
 
     def refuse(self) -> NoReturn:
-        """Say which samples are not finite, where what was made of them is not.
+        """Raise an error that names the samples that are not finite, after a result that is not finite.
 
         Raises:
             InputError: always.
@@ -289,13 +289,13 @@ class Call:
     def back(
         self, weights: NDArray[np.floating], samples: bool, wanted: Collection[str], numbers: Mapping[str, Any]
     ) -> tuple[Any, dict[str, Any]]:
-        """Derivatives of weighted pictures to samples and to parameters.
+        """Gradients of weighted images with respect to samples and parameters.
 
         Args:
-            weights: of the pictures.
-            samples: whether the derivative to them is wanted.
+            weights: of the images.
+            samples: whether the gradient with respect to the samples is wanted.
             wanted: names of parameters.
-            numbers: of all parameters, at which the plans were made.
+            numbers: of all parameters, as for the plans.
         """
         chain, cameras = self.work.chain, self._cameras(numbers)
         of_plan = {number for name in wanted for number in self.work.followed[name]}
@@ -321,5 +321,5 @@ class Call:
 
 
 def _stacked(arrays: list[Any]) -> Any:
-    """Arrays with an axis in front; one alone, which may be large, is not copied."""
+    """Arrays stacked along a new leading axis; a single array, which may be large, is not copied."""
     return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)

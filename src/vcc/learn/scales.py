@@ -1,6 +1,6 @@
-"""How far each parameter goes for a change of 1 while it learns: one learning rate then serves all of them.
+"""The size of a change of 1 for each parameter during learning, so that one learning rate suits all parameters.
 
-A change of 1 moves light by about ten pixels, or a length by 1 % of itself: a step of 0.01, as Adam takes it by a
+A change of 1 moves light by about ten pixels, or changes a length by 1 %: a step of 0.01, as Adam takes it with a
 learning rate of 0.01, moves light by about a tenth of a pixel.
 
 | what                                                    | a change of 1 is                                      |
@@ -48,25 +48,25 @@ from vcc.shapes.surfaces import Axicon, Cubic, HeightMap, PathMap, Rough, Tilt, 
 LIGHT_MOVES = 10.0
 """Pixels by which light moves for a change of 1."""
 OF_A_LENGTH = 0.01
-"""Share of a length along the axis, a focal length or a period that a change of 1 is."""
+"""Relative size of a change of 1, for lengths along the axis, focal lengths and periods."""
 ROTATION = 0.01
 """Radians."""
 SHORTEST = 1e-3
-"""Metres that are taken for a way of no length, from an element that lies on the sensor."""
+"""The smallest distance in metres to the sensor, for elements on the sensor."""
 F_NUMBER = 5.0
-"""Of the cone of light through a plate of no stated size."""
+"""F-number of the cone of light through a plate of unknown size."""
 
 
 @dataclass(frozen=True)
 class _At:
-    """A parameter in its camera, and the lengths that there are around it."""
+    """A parameter in its camera, with the relevant lengths."""
 
     train: Train
     found: Parameter
 
     @property
     def itself(self) -> float:
-        """The largest of the numbers; 1 where all are 0."""
+        """The largest absolute value of the numbers; 1 if all are 0."""
         return float(np.abs(self.found.array()).max(initial=0.0)) or 1.0
 
     @property
@@ -79,7 +79,7 @@ class _At:
 
     @property
     def way(self) -> float:
-        """From the element to the sensor, metres."""
+        """Distance from the element to the sensor, metres."""
         owner = self.found.owner
         place = owner.z + owner.length if isinstance(owner, Element) else 0.0
         return max(self.train.sensor.z - place, SHORTEST)
@@ -90,7 +90,7 @@ class _At:
 
     @property
     def radius(self) -> float:
-        """Of the plate that the parameter's element is, metres."""
+        """Radius of the parameter's plate, metres."""
         plate, surface = self.found.owner, self.found.holder
         for sized in (plate, surface):
             size = getattr(sized, "diameter", None) or getattr(sized, "width", None)
@@ -170,7 +170,7 @@ OWN: Mapping[tuple[type, str], Callable[[_At], float]] = {
     (Cubic, "strength"): _cubic,
     (Electronics, "wavelength"): _itself,
 }
-"""Of fields of single classes; a subclass has its base's."""
+"""Rules for fields of a class and its subclasses."""
 BY_NAME: Mapping[str, Callable[[_At], float]] = {
     "z": _along,
     "focal_length": _of_itself,
@@ -181,18 +181,18 @@ BY_NAME: Mapping[str, Callable[[_At], float]] = {
     "middle": _across,
     "rotation": _rotation,
 }
-"""Of fields of a name, whatever their class."""
+"""Rules for fields by name, for any class."""
 
 
 def scale(train: Train, name: str) -> float:
-    """How much of a parameter, in its SI unit, a change of 1 is while it learns: see the table above.
+    """The change of a parameter, in its SI unit, that counts as 1 during learning: see the table above.
 
     Args:
-        train: as it is when learning begins; scales stay what they are then.
+        train: the initial camera; the scales then stay fixed.
         name: of the parameter.
 
     Raises:
-        InputError: as `vcc.learn.parameters.parameter`.
+        InputError: as for `vcc.learn.parameters.parameter`.
     """
     found = parameter(train, name)
     rule = next(

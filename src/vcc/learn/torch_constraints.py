@@ -1,7 +1,7 @@
-"""Constraints on what is learned, as ordinary functions of tensors: what a camera can be made of.
+"""Constraints on learned parameters, as functions of tensors: they keep a camera physically valid.
 
-Each takes numbers that are free, or nearly so, and gives numbers that an element takes; they can be put one around
-the other: ``binary(sigmoid_mask(raw))``.
+Each function maps free numbers to numbers that an element accepts. Functions can be composed:
+``binary(sigmoid_mask(raw))``.
 """
 
 from __future__ import annotations
@@ -15,49 +15,49 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 
 _SHARE = "vcc_share_of_light"
-"""The attribute in which tensors of `total_light` hold the share that they were asked for."""
+"""The attribute in which tensors of `total_light` store their share."""
 _GOLDEN = 0.6180339887498949
-"""Fraction of the golden ratio: multiples of it are spread evenly from 0 to 1."""
+"""Fractional part of the golden ratio: its multiples modulo 1 are evenly spread."""
 NEAR = 1e-6
-"""How near to 0 and 1 a transmission may come before its logarithm is taken."""
+"""Transmissions are clipped to this distance from 0 and 1 before the logarithm."""
 ENOUGH = 60
-"""Halvings of the interval in which the shift of `total_light` lies: to the last digit of double precision."""
+"""Bisection steps for the shift of `total_light`: to the last digit of double precision."""
 FURTHEST = 40.0
-"""The largest shift of `total_light`, in logarithms of odds: 1 in 10¹⁷."""
+"""The largest shift of `total_light`, in log-odds: 1 in 10¹⁷."""
 
 
 def sigmoid_mask(raw: torch.Tensor) -> torch.Tensor:
-    """Any numbers as transmissions, 0 to 1: 1/(1 + exp(−raw)), of any shape.
+    """Map any numbers to transmissions, 0 to 1: 1/(1 + exp(−raw)), of any shape.
 
-    Begin with `raw_of` of the transmissions that are to be there first.
+    Start from `raw_of` of the initial transmissions.
     """
     return torch.sigmoid(raw)
 
 
 def raw_of(mask: torch.Tensor) -> torch.Tensor:
-    """The numbers of which `sigmoid_mask` makes these transmissions: log(T/(1 − T)), of any shape.
+    """The inverse of `sigmoid_mask`: log(T/(1 − T)), of any shape.
 
     Args:
-        mask: transmissions, 0 to 1; those nearer than 1e-6 to an end are taken to lie there.
+        mask: transmissions, 0 to 1; values closer than 1e-6 to 0 or 1 are clipped.
     """
     return torch.logit(mask, eps=NEAR)
 
 
 INVERSES = {sigmoid_mask: raw_of}
-"""Constraints that can be undone: where free numbers begin."""
+"""Constraints with an inverse, which gives the initial free numbers."""
 
 
 def binary(mask: torch.Tensor, share: float | None = None) -> torch.Tensor:
-    """Transmissions as 0 or 1; gradients go straight through (Bengio et al. 2013).
+    """Round transmissions to 0 or 1; straight-through gradients (Bengio et al. 2013).
 
     Args:
-        mask: transmissions, 0 to 1, of any shape, as `sigmoid_mask` gives them; with a share (..., rows, columns).
-        share: of the light: the brightest cells of each mask are open, as many as come nearest to the share, and
-            one at least; of equally bright ones some that are spread evenly. None takes the share of `total_light`
-            where ``mask`` is what that returned; else each cell is open at ½ and above.
+        mask: transmissions, 0 to 1, of any shape, as `sigmoid_mask` returns; with a share (..., rows, columns).
+        share: of the light: the brightest cells of each mask are open, as many as come nearest to the share, at
+            least one; among equally bright cells, an evenly spread selection. None uses the share of `total_light`
+            if ``mask`` is its result; otherwise each cell is open from ½ on.
 
     Raises:
-        InputError: no such share.
+        InputError: an invalid share.
     """
     if share is None:
         share = getattr(mask, _SHARE, None)
@@ -67,7 +67,7 @@ def binary(mask: torch.Tensor, share: float | None = None) -> torch.Tensor:
 
 
 def _brightest(mask: torch.Tensor, share: float) -> torch.Tensor:
-    """1 for the brightest cells of each mask, as many as make a share of them, and 0 for the others."""
+    """1 for the brightest cells of each mask, in number a share of all cells; 0 for the others."""
     cells = mask.shape[-2] * mask.shape[-1]
     opened = min(max(round(share * cells), 1), cells)
     evenly = torch.argsort(torch.arange(cells, dtype=torch.float64) * _GOLDEN % 1)
@@ -77,41 +77,41 @@ def _brightest(mask: torch.Tensor, share: float) -> torch.Tensor:
 
 
 def levels(number: int) -> Callable[[torch.Tensor], torch.Tensor]:
-    """A function that rounds transmissions to so many even levels; gradients go straight through.
+    """A function that rounds transmissions to evenly spaced levels; straight-through gradients.
 
     Args:
-        number: of levels from 0 to 1, both included, 2 or more.
+        number: levels from 0 to 1, both included; 2 or more.
 
     Raises:
-        InputError: another number.
+        InputError: an invalid number.
     """
     steps = checks.whole_number_between("number of levels", number, 2) - 1
 
     def rounded(mask: torch.Tensor) -> torch.Tensor:
-        """Transmissions, 0 to 1, of any shape, at the nearest level."""
+        """Round transmissions, 0 to 1, of any shape, to the nearest level."""
         return _straight_through(mask, torch.round(mask * steps) / steps)
 
     return rounded
 
 
 def total_light(mask: torch.Tensor, share: float) -> torch.Tensor:
-    """Transmissions of which a given share passes in the mean, all between 0 and 1; `binary` of them keeps it.
+    """Transmissions between 0 and 1 with a given mean; `binary` preserves the share.
 
-    The odds T/(1 − T) of all cells are multiplied by one factor, which is found so that the mean is right: none
-    leaves 0 to 1, and 0 and 1 stay (nearly) what they are. The derivative is that of the factor, too.
+    The odds T/(1 − T) of all cells are multiplied by the one factor that gives this mean: all values stay
+    between 0 and 1, and 0 and 1 stay (nearly) the same. The gradient includes the derivative of the factor.
 
     Args:
-        mask: transmissions, 0 to 1, (..., rows, columns): of each mask for itself.
-        share: of the light, the mean of the transmissions, above 0 and below 1.
+        mask: transmissions, 0 to 1, (..., rows, columns); each mask has its own factor.
+        share: of the light: the mean of the transmissions, above 0 and below 1.
 
     Raises:
-        InputError: no such share.
+        InputError: an invalid share.
     """
     share = _checked_share(share)
     odds = torch.logit(mask, eps=NEAR)
     shift = _shift(odds.detach(), share)
     light = torch.sigmoid(odds + shift)
-    # One step of Newton's: no change in value, and the derivative of the implicit function.
+    # One Newton step: it does not change the value, but has the derivative of the implicit function.
     slope = (light * (1 - light)).mean(dim=(-2, -1), keepdim=True).detach()
     shift = shift - (light.mean(dim=(-2, -1), keepdim=True) - share) / slope
     found = torch.sigmoid(odds + shift)
@@ -127,7 +127,7 @@ def _checked_share(share: float) -> float:
 
 
 def _shift(odds: torch.Tensor, share: float) -> torch.Tensor:
-    """What is added to logarithms of odds so that the mean transmission is a share, by halving."""
+    """The shift of log-odds that makes the mean transmission equal to a share, by bisection."""
     low = torch.full_like(odds[..., :1, :1], -FURTHEST)
     high = -low
     for _ in range(ENOUGH):

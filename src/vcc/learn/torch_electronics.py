@@ -1,12 +1,12 @@
-"""What a sensor's electronics make of a picture, as a function that carries gradients.
+"""The electronics of a sensor as a function with gradients: from an image to digital numbers.
 
-The physics is that of `vcc.run.expose` (EMVA 1288), with what has no derivative replaced:
+The model is that of `vcc.run.expose` (EMVA 1288); steps without a derivative are replaced:
 
-- the number of electrons is its mean and √mean times a normal number (drawn beforehand, so that the derivative
-  goes through both), where `vcc.Camera.expose` draws a Poisson number. Mean and variance are right at any number
-  of electrons; the distribution is from about 20 electrons on (its skewness, 1/√n, is then 0.2 and less).
-- rounding to whole numbers lets gradients straight through.
-- what clips has the derivative that it has: 0 below black and above the full well or the largest number.
+- The number of electrons is the mean plus √mean times a normal random number (drawn independently, so that the
+  gradient includes both), instead of a Poisson number as in `vcc.Camera.expose`. Mean and variance are exact for
+  any number of electrons; the distribution from about 20 electrons on (its skewness, 1/√n, is then at most 0.2).
+- Rounding to integers has straight-through gradients.
+- Clipping has its own derivative: 0 below black and above the full well or the largest number.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from vcc.optics.sensor import Sensor
 from vcc.run.expose import AUTO_LEVEL, electronics_of, fixed_pattern
 
 MUCH_SATURATED = 0.1
-"""The share of what is recorded from which on it is said that it is saturated, and has no gradients."""
+"""The share of saturated values, which have no gradients, from which on a warning is given."""
 FEWEST = 1.0
-"""Electrons below which the derivative of √n is that at so many: at none at all it would be infinite."""
+"""Electrons below which √n uses the derivative at this number: at 0 it would be infinite."""
 NUMBERS = tuple(field.name for field in dataclasses.fields(Electronics) if str(field.type).startswith("float"))
-"""Of the electronics, what may be a tensor."""
+"""Parameters of the electronics that may be tensors."""
 
 
 def expose(
@@ -42,29 +42,30 @@ def expose(
     generator: torch.Generator | None = None,
     **numbers: float | torch.Tensor,
 ) -> torch.Tensor:
-    """What a sensor records of a picture, in digital numbers, with gradients to all that is a tensor.
+    """The digital numbers that a sensor records of an image, with gradients with respect to all tensors.
 
     Args:
         picture: irradiance, radiance × steradian, (..., rows, columns) or (..., rows, columns, channels), as
-            `CameraModule` gives it. What is below 0 is dark.
+            `CameraModule` returns it. Negative values count as 0.
         sensor: with electronics.
         exposure: seconds.
-        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
-        noise: whether there is noise of light and of reading; PRNU and DSNU, which are the sensor's, are always.
-        generator: of the noise; None takes PyTorch's own.
-        numbers: of the electronics, those that are to be others, by name, tensors or numbers: ``gain``,
+        radiance: the radiance of a light field's sample value of 1, W/(m²·sr), in each channel's band.
+        noise: whether shot noise and read noise are added; PRNU and DSNU, fixed for the sensor, always are.
+        generator: of the noise; None uses PyTorch's default.
+        numbers: replacements for parameters of the electronics, by name, tensors or numbers: ``gain``,
             ``black_level``, ``read_noise``, ``dark_current``, ``full_well``, ``quantum_efficiency``,
-            ``wavelength``, ``prnu``, ``dsnu``; in their units (`vcc.Electronics`).
+            ``wavelength``, ``prnu``, ``dsnu``; in the units of `vcc.Electronics`.
 
     Returns:
-        Digital numbers, whole ones, of the picture's type: its shape, without the channels behind a colour filter.
+        Digital numbers with integer values, of the image's type and shape, without channels if there is a
+        colour filter.
 
     Raises:
-        InputError: a picture of another shape than the sensor or not finite, channels that the sensor cannot
-            record, a sensor without electronics, no exposure above 0, numbers that do not exist.
+        InputError: an image that does not fit the sensor or is not finite, unsupported channels, a sensor without
+            electronics, an exposure that is not positive, unknown parameters.
 
     Warns:
-        ResultWarning: gradients are wanted, and a tenth of what is recorded or more is saturated: it has none.
+        ResultWarning: gradients are wanted, and at least a tenth of the values is saturated and has none.
     """
     return exposed(picture, sensor, exposure, numbers, radiance, sensor.sensitive_area, generator, noise)
 
@@ -79,7 +80,7 @@ def exposed(
     generator: torch.Generator | None,
     noise: bool,
 ) -> torch.Tensor:
-    """As `expose`, for pixels of any sensitive area, m², a tensor or a number."""
+    """Like `expose`, with any sensitive area of the pixels, m², a tensor or a number."""
     electronics = electronics_of(sensor)
     seconds = _above_zero("exposure", exposure)
     radiance = checks.above_zero("radiance", radiance, unit="W/(m²·sr)")
@@ -92,7 +93,7 @@ def exposed(
     mean = torch.clamp(light, min=0.0) * per_joule * (radiance * area * seconds)
     offset: Any = 0.0
     if any(getattr(electronics, name) or name in numbers for name in ("prnu", "dsnu")):
-        # The sensor's own, and so the same in all pictures of a batch.
+        # Fixed for the sensor, and so the same in all images of a batch.
         shape = (*sensor.shape, *light.shape[light.ndim - channel.axes :])
         sensitivity, unlike = (_tensor(part, light) for part in fixed_pattern(shape, electronics))
         mean = mean * torch.clamp(1 + known["prnu"] * sensitivity, min=0.0)
@@ -110,7 +111,7 @@ def exposed(
 def _warn_of_saturation(
     mean: torch.Tensor, known: dict[str, Any], electronics: Electronics, seconds: torch.Tensor
 ) -> None:
-    """Say where much of what is recorded is at the end of its range, from which no gradient comes back."""
+    """Warn if many values are saturated and have no gradient."""
     most = (electronics.largest_number - known["black_level"]) / known["gain"]
     full = torch.minimum(most, known["full_well"])
     share = float((mean >= full).double().mean())
@@ -125,18 +126,18 @@ def _warn_of_saturation(
 
 
 def _charge(mean: Any, known: dict[str, Any], generator: torch.Generator | None, noise: bool) -> Any:
-    """Electrons of a mean, at most the full well, with the noise of reading them."""
+    """Electrons for a mean, at most the full well, plus read noise."""
     if not noise:
         return torch.minimum(mean, known["full_well"])
     shot, read = (torch.randn(mean.shape, generator=generator, dtype=mean.dtype) for _ in range(2))
-    # Its value is √mean; its derivative that of the tangent at FEWEST where there are fewer.
+    # Its value is √mean; its derivative below FEWEST is that at FEWEST.
     root = torch.sqrt(torch.clamp(mean, min=FEWEST)) + torch.clamp(mean - FEWEST, max=0.0) / (2 * FEWEST**0.5)
     root = root + (torch.sqrt(mean) - root).detach()
     return torch.minimum(mean + root * shot, known["full_well"]) + known["read_noise"] * read
 
 
 def _numbers(charge: Any, known: dict[str, Any], electronics: Electronics) -> Any:
-    """Digital numbers of electrons: rounded, with the derivative of what is not, and clipped."""
+    """Digital numbers of electrons: rounded with straight-through gradients, and clipped."""
     numbers = known["black_level"] + known["gain"] * charge
     rounded = numbers + (torch.round(numbers) - numbers).detach()
     return torch.clamp(rounded, 0.0, float(electronics.largest_number))
@@ -144,11 +145,11 @@ def _numbers(charge: Any, known: dict[str, Any], electronics: Electronics) -> An
 
 @dataclasses.dataclass(frozen=True)
 class _Channel:
-    """Which channel each pixel's light is of.
+    """The channel of each pixel's light.
 
     Args:
-        index: of the channel, a tensor that broadcasts against a picture's last axes; None for grey.
-        axes: how many axes of channels light has behind its filters, 0 or 1.
+        index: of the channel, a tensor that broadcasts against an image's last axes; None for grey.
+        axes: number of channel axes behind the filters, 0 or 1.
     """
 
     index: torch.Tensor | None
@@ -156,7 +157,7 @@ class _Channel:
 
 
 def _filtered(picture: torch.Tensor, sensor: Sensor, electronics: Electronics) -> tuple[torch.Tensor, _Channel]:
-    """Light as each pixel gets it behind its colour filter, (..., rows, columns[, channels])."""
+    """The light of each pixel behind its colour filter, (..., rows, columns[, channels])."""
     _check_picture(picture, sensor)
     channels = picture.shape[-1] if picture.shape[-3:-1] == sensor.shape else None
     electronics.check_channels(channels)
@@ -185,7 +186,7 @@ def _check_picture(picture: Any, sensor: Sensor) -> None:
 
 
 def _checked(numbers: dict[str, Any]) -> dict[str, Any]:
-    """Numbers of the electronics that there are."""
+    """Check the names of parameters of the electronics."""
     for name in numbers:
         if name not in NUMBERS:
             near = difflib.get_close_matches(name, NUMBERS, 1)
@@ -195,7 +196,7 @@ def _checked(numbers: dict[str, Any]) -> dict[str, Any]:
 
 
 def _above_zero(name: str, value: float | torch.Tensor) -> float | torch.Tensor:
-    """A number above 0, of which a tensor stays one."""
+    """Check that a number is positive; a tensor stays a tensor."""
     plain = value.detach().item() if isinstance(value, torch.Tensor) and value.ndim == 0 else value
     checks.above_zero(name, plain, unit="s", way_out="give a time such as 10 * vcc.units.ms, or a tensor of one")
     return value
@@ -206,5 +207,5 @@ def _tensor(value: Any, like: torch.Tensor) -> torch.Tensor:
 
 
 def _of(number: torch.Tensor, channel: _Channel) -> torch.Tensor:
-    """A number of the electronics for the light of each pixel."""
+    """A parameter of the electronics for each pixel's channel."""
     return number[channel.index] if number.ndim and channel.index is not None else number

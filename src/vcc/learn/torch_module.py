@@ -1,4 +1,4 @@
-"""A camera as a module of PyTorch: pictures that carry gradients to samples and to the camera's parameters."""
+"""A camera as a PyTorch module: images with gradients to samples and to the camera's parameters."""
 
 from __future__ import annotations
 
@@ -39,19 +39,19 @@ _NUMBERS_ALONE = (
     "model.replan()"
 )
 AREA = ("pitch", "fill_factor")
-"""Of the sensor, what pictures and what is recorded of them depend on."""
+"""Fields of the sensor on which both images and recordings depend."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Learned:
-    """One parameter that is learned.
+    """A learned parameter.
 
     Args:
         name: of the parameter.
         key: its name in the module's state.
         shape: of its numbers.
-        scale: of which the module keeps multiples.
-        constraints: on its numbers, one after the other.
+        scale: the unit of the stored numbers.
+        constraints: functions of its numbers, applied in order.
     """
 
     name: str
@@ -61,14 +61,14 @@ class _Learned:
     constraints: tuple[Constraint, ...] = ()
 
     def kept(self, numbers: NDArray[np.float64]) -> torch.Tensor:
-        """What the module keeps of numbers, as far as their constraints can be undone."""
+        """The stored form of numbers, as far as their constraints can be inverted."""
         tensor = torch.as_tensor(numbers)
         for constraint in reversed(self.constraints):
             tensor = INVERSES.get(constraint, lambda same: same)(tensor)
         return tensor / self.scale
 
     def numbers(self, kept: torch.Tensor) -> torch.Tensor:
-        """The numbers, SI units, of what the module keeps."""
+        """The numbers, SI units, from their stored form."""
         tensor = kept if self.scale == 1 else kept * self.scale
         for constraint in self.constraints:
             tensor = constraint(tensor)
@@ -79,31 +79,29 @@ class _Learned:
 
 
 class CameraModule(torch.nn.Module):  # type: ignore[misc]
-    """A camera that learns, on a light field or on others of the same grid.
+    """A camera with learned parameters, for a light field or others on the same grid.
 
-    Each parameter is kept in multiples of a scale of its own (`vcc.learn.scales`, to the nearest power of two, so
-    that nothing is rounded), in double precision: one learning rate then serves all. In the state it goes by its
-    own name, ``"main.focal_length"``; cells that were given as `vcc.patterns.Cells` by ``"code.pattern.values"``.
+    Each parameter is stored in multiples of its own scale (`vcc.learn.scales`, rounded to a power of two, so that
+    scaling is exact), in double precision: one learning rate then suits all. In the state it has its own name,
+    ``"main.focal_length"``; cells given as `vcc.patterns.Cells` are called ``"code.pattern.values"``.
 
-    What is decided by the camera with which learning begins (footprints or rays, how finely masks are sampled,
-    what fills gaps between views) stays so while it learns; `explain` says when planning again would decide
-    otherwise, and `replan` does.
+    Choices that depend on the initial camera (footprints or rays, mask sampling, interpolation between views) stay
+    fixed during learning. `explain` reports whether planning again would change them, and `replan` plans again.
 
     Args:
-        camera: as it is when learning begins.
-        light_field: at its entrance plane, in memory or on disk; not part of the module's state.
+        camera: the initial camera.
+        light_field: at the camera's entrance plane, in memory or on disk; not part of the module's state.
         learn: names of parameters (`vcc.learn.parameters`), such as ``["code.pattern", "main.focal_length",
-            "sensor.z"]``; none where gradients to samples are all that is wanted.
-        how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose pictures are float64.
-        constraints: functions of tensors by names of parameters: what the camera gets is the function's value of
-            the free numbers that are learned, all in SI units; several are called one after the other. The free
-            numbers begin at `raw_of` the camera's own below `sigmoid_mask`, and at the camera's own below other
-            functions.
+            "sensor.z"]``; empty if only gradients to samples are wanted.
+        how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose images are float64.
+        constraints: functions of tensors by parameter name. The camera's parameter is the function's value for the
+            learned free numbers, all in SI units; several functions are applied in order. With `sigmoid_mask` the
+            free numbers start at `raw_of` the camera's own; with other functions at the camera's own.
         options: as in `vcc.Camera.capture`.
 
     Raises:
-        InputError: a parameter that does not exist or cannot be learned here (named, with the reason), constraints
-            of what is not learned, an engine or a tolerance that cannot be gone through backwards.
+        InputError: a parameter that does not exist or cannot be learned here (the message gives the reason),
+            constraints of a parameter that is not learned, an engine or a tolerance without derivatives.
     """
 
     def __init__(
@@ -141,7 +139,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             self._add(learned, read(camera, learned.name))
 
     def _add(self, learned: _Learned, numbers: NDArray[np.float64]) -> None:
-        """A parameter in modules within modules, by its key."""
+        """Register a parameter in nested modules, according to its key."""
         *places, last = learned.key.split(".")
         holder: torch.nn.Module = self
         for place in places:
@@ -155,29 +153,29 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             holder = holder._modules[place]
         holder.register_parameter(last, torch.nn.Parameter(learned.kept(numbers)))
 
-    # --- pictures ---
+    # --- images ---
 
     def forward(
         self, samples: torch.Tensor | None = None, *, values: Mapping[str, torch.Tensor] | None = None
     ) -> torch.Tensor:
-        """The picture of the light field, or of others on its grid.
+        """The image of the light field, or of others on its grid.
 
         Args:
             samples: of other light fields of the same shape and geometry, with or without gradients: (…, v, u,
                 t, s[, channels]), floating point (radiance) or unsigned integers (shares of their largest value);
-                None takes the light field's own.
-            values: numbers, SI units, for parameters that are learned, instead of the module's own: of the
-                parameter's shape, or with one axis in front for as many pictures, such as (n, rows, columns) for n
-                masks on one light field.
+                None uses the samples of the light field.
+            values: numbers, SI units, for learned parameters, instead of the module's own: in the parameter's
+                shape, or with one leading axis for several images, such as (n, rows, columns) for n masks on
+                one light field.
 
         Returns:
-            Irradiance as light lands on the sensor, (…, rows, columns[, channels]), float32 (float64 by
-            ``"reference"``), as `vcc.Camera.capture` gives it. The axes of ``values`` stand before those of
+            Irradiance on the sensor, inverted as it lands, (…, rows, columns[, channels]), float32 (float64 with
+            ``"reference"``), as `vcc.Camera.capture` returns it. The axes of ``values`` precede those of
             ``samples``.
 
         Raises:
-            InputError: samples of another shape or kind; anything that is not in the CPU's memory; a parameter
-                that is not finite or that its element does not take, named; samples that are not finite.
+            InputError: samples of a wrong shape or type; tensors that are not in CPU memory; a parameter that
+                is not finite or invalid for its element; samples that are not finite.
         """
         return _undisturbed(self._pictures, samples, values)
 
@@ -190,11 +188,11 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         return pictures(self._work, given, in_pictures, several)
 
     def values(self) -> dict[str, torch.Tensor]:
-        """The numbers of all parameters that are learned, SI units, scaled and constrained, with gradients."""
+        """All learned parameters, SI units, scaled and constrained, with gradients."""
         return {name: learned.numbers(self._kept(learned)) for name, learned in self._learned.items()}
 
     def _kept(self, learned: _Learned) -> torch.Tensor:
-        """What the module keeps of a parameter; looked up each time, for parametrizations and functional calls."""
+        """The stored form of a parameter; looked up each time, for parametrizations and functional calls."""
         thing: Any = self
         for place in learned.key.split("."):
             thing = getattr(thing, place)
@@ -206,7 +204,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         return thing
 
     def _numbers(self, values: Mapping[str, torch.Tensor] | None) -> dict[str, torch.Tensor]:
-        """The numbers of all parameters, some of them given."""
+        """The numbers of all parameters, some of them replaced by ``values``."""
         given = dict(values or {})
         for name in given:
             if name not in self._learned:
@@ -230,18 +228,18 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         noise: bool = True,
         generator: torch.Generator | None = None,
     ) -> torch.Tensor:
-        """What the sensor records, in digital numbers, with gradients; see `vcc.torch.expose`.
+        """The sensor's recording, in digital numbers, with gradients; see `vcc.torch.expose`.
 
         Args:
             exposure: seconds, a number or a tensor.
-            samples: as for the picture.
-            values: likewise.
-            radiance: what a sample value of 1 stands for, W/(m²·sr).
-            noise: whether there is noise of light and of reading.
+            samples: as for the image.
+            values: as for the image.
+            radiance: the radiance of a sample value of 1, W/(m²·sr).
+            noise: whether shot noise and read noise are added.
             generator: of the noise.
 
         Raises:
-            InputError: as for the picture and `vcc.torch.expose`.
+            InputError: as for the image and `vcc.torch.expose`.
         """
         sensor = self._work.camera.sensor
         numbers = self._numbers(values)
@@ -260,10 +258,10 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
     # --- the camera ---
 
     def camera(self) -> Train:
-        """The camera with what was learned, which saves to TOML: ``model.camera().save("learned.toml")``.
+        """The camera with the learned parameters; it saves to TOML: ``model.camera().save("learned.toml")``.
 
         Raises:
-            InputError: a parameter that is not finite or that its element does not take, named.
+            InputError: a parameter that is not finite or invalid for its element.
         """
         return put(self._work.camera, self._as_arrays())
 
@@ -271,16 +269,16 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         return {name: _array(number) for name, number in self.values().items()}
 
     def explain(self) -> str:
-        """The plan in words, and what planning again with what was learned would decide otherwise."""
+        """The plan as text, and the choices that planning again with the learned parameters would change."""
         scales = {name: each.scale for name, each in self._learned.items()}
         return explained_while_learning(self._work, self._as_arrays(), scales, "model.replan()")
 
     def replan(self, **options: Any) -> None:
-        """Decide anew, by what was learned, how the picture is made; parameters and their scales stay.
+        """Plan again, for the learned parameters; parameters and their scales stay the same.
 
         Args:
-            options: as in `vcc.Camera.capture`, instead of those that the module has: ``replan(seed=step)`` sends
-                other rays, so that a camera does not learn by heart where the first ones went.
+            options: as in `vcc.Camera.capture`, replacing the module's: ``replan(seed=step)`` draws new rays,
+                which avoids overfitting to the first ones.
 
         Raises:
             InputError: as for the module.
@@ -292,10 +290,10 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
     # --- the state ---
 
     def get_extra_state(self) -> dict[str, Any]:
-        """The scales, which numbers in the state are multiples of, and by what the picture was planned.
+        """The scales of the stored numbers, and the inputs of the planner.
 
-        Plans follow from what they are planned for: kept are the numbers that the parameters had then, the seed of
-        rays, and hashes of all else.
+        Plans follow from these inputs: the parameters at the time, the seed of rays, and hashes of all other
+        inputs.
         """
         work = self._work
         return {
@@ -307,14 +305,14 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         }
 
     def set_extra_state(self, state: dict[str, Any]) -> None:
-        """Plan as the module did whose state this is, so that its pictures are the same.
+        """Plan as the module that saved this state, so that images are the same.
 
         Raises:
-            InputError: the state is of a module whose camera began otherwise, with another light field or other
-                options; or it does not contain by what was planned.
+            InputError: the state is from a module with another initial camera, light field or options; or it
+                has no record of the planning.
 
         Warns:
-            ResultWarning: another version planned.
+            ResultWarning: the state was planned by another version.
         """
         if "planned" not in state:
             raise InputError(f"this state, of an earlier version, has no record of the planning. {_NUMBERS_ALONE}")
@@ -344,20 +342,20 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             self._work = Work.of(there.camera, work.light_field, there.how, work.chain.names)
 
     def extra_repr(self) -> str:
-        """What is learned, and the size of the picture."""
+        """The learned parameters, and the size of the image."""
         rows, columns = self._work.camera.sensor.shape
         return f"learns {', '.join(self._learned) or 'nothing'}; pictures of {rows}×{columns}"
 
 
 def _undisturbed(function: Callable[..., torch.Tensor], *arguments: Any) -> torch.Tensor:
-    """A call that torch.compile leaves as it is. Its module takes seconds to load: it is there when it is due."""
+    """Call a function outside torch.compile; its module, slow to import, is used only if it is loaded."""
     compiler = sys.modules.get("torch._dynamo")
     if compiler is not None:
         function = torch.compiler.disable(function)
     return function(*arguments)
 
 
-# --- what is given ---
+# --- inputs ---
 
 
 def _several(name: str, constraints: Any) -> tuple[Constraint, ...]:
@@ -374,7 +372,7 @@ def _key(found: Parameter) -> str:
 
 
 def _as_numbers(value: Any, learned: _Learned) -> torch.Tensor:
-    """A value for a parameter, for one picture or several."""
+    """A value for a parameter, for one image or several, checked."""
     if not isinstance(value, torch.Tensor) or not value.is_floating_point():
         kind = value.dtype if isinstance(value, torch.Tensor) else type(value).__name__
         raise InputError(f"values for {learned.name} are a tensor of floating point, not {kind}")
@@ -384,7 +382,7 @@ def _as_numbers(value: Any, learned: _Learned) -> torch.Tensor:
 
 
 def _as_samples(samples: Any, grid: Grid) -> torch.Tensor:
-    """Samples of the light field's shape, any number of them."""
+    """Samples in the light field's shape, with any leading axes, checked."""
     if not isinstance(samples, torch.Tensor):
         raise InputError(
             f"samples are a tensor, not {type(samples).__name__}: torch.as_tensor(light_field.values) makes one"
@@ -400,7 +398,7 @@ def _as_samples(samples: Any, grid: Grid) -> torch.Tensor:
 
 
 KINDS = (torch.float32, torch.float64, torch.float16, torch.uint8, torch.uint16)
-"""Types that samples may have."""
+"""Supported types of samples."""
 
 
 def _check_device(what: str, tensor: torch.Tensor) -> None:

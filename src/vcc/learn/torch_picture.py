@@ -1,4 +1,4 @@
-"""Pictures as functions that PyTorch takes derivatives of."""
+"""Images as differentiable PyTorch functions."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from vcc.learn.pictures import Call, Work
 def pictures(
     work: Work, samples: torch.Tensor | None, numbers: Mapping[str, torch.Tensor], several: Collection[str]
 ) -> torch.Tensor:
-    """The pictures of one or several light fields by one or several cameras.
+    """The images of one or several light fields by one or several cameras.
 
     Args:
         work: camera and light field.
-        samples: (…, v, u, t, s[, channels]); None for the light field's own.
+        samples: (…, v, u, t, s[, channels]); None for the samples of the light field.
         numbers: by the names of the chain.
-        several: those that have an axis of cameras in front.
+        several: the parameters with a leading axis of cameras.
 
     Returns:
         (…, rows, columns[, channels]), the axis of cameras before those of the light fields.
@@ -31,7 +31,7 @@ def pictures(
 
 
 class _Pictures(torch.autograd.Function):  # type: ignore[misc]
-    """Pictures: linear in the samples, smooth in the parameters."""
+    """Images: linear in the samples, smooth in the parameters."""
 
     @staticmethod
     def forward(call: Call, samples: torch.Tensor | None, *numbers: torch.Tensor) -> torch.Tensor:
@@ -53,7 +53,7 @@ class _Pictures(torch.autograd.Function):  # type: ignore[misc]
 
 
 class _Back(torch.autograd.Function):  # type: ignore[misc]
-    """The way back, which has no way back of its own."""
+    """The reverse pass, which is not differentiable itself."""
 
     @staticmethod
     def forward(

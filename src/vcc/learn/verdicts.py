@@ -1,4 +1,4 @@
-"""What may be learned of a camera before a light field, and how true its derivatives are."""
+"""Which parameters of a camera can be learned with a light field, and how exact their derivatives are."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from vcc.shapes.patterns import Polygon
 Kind = Literal["exact", "smoothed", "refused"]
 
 ELECTRONICS = f"{SENSOR}.electronics."
-"""How names of parameters begin that pictures do not depend on, but what is recorded of them."""
+"""Prefix of the parameters that affect recordings, but not images."""
 
 
 STEP = 1e-4
-"""Of a change of 1 (`vcc.learn.scales`): far enough for all that follows to be seen."""
+"""Step relative to a change of 1 (`vcc.learn.scales`): large enough to reveal all dependent numbers."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a parameter may be learned.
+    """Whether a parameter can be learned.
 
     Args:
-        kind: ``"exact"``: the derivative is that of the picture; ``"smoothed"``: it is that of a picture, or of a
-            recording, from which jumps are taken; ``"refused"``: there is none.
-        why: it is not exact, in words.
+        kind: ``"exact"``: the derivative of the image itself; ``"smoothed"``: the derivative of an image or a
+            recording with jumps smoothed; ``"refused"``: no derivative.
+        why: the reason why it is not exact, as text.
     """
 
     kind: Kind
@@ -42,16 +42,16 @@ class Verdict:
 
 
 def verdict(train: Train, grid: Grid, name: str, how: How | None = None) -> Verdict:
-    """Whether a parameter of a camera may be learned before a light field.
+    """Whether a parameter of a camera can be learned with a light field.
 
     Args:
         train: the camera.
         grid: of the light field.
         name: of the parameter.
-        how: what was chosen of the computation; None takes the defaults.
+        how: the settings; None uses the defaults.
 
     Raises:
-        InputError: there is no such parameter.
+        InputError: an unknown parameter.
     """
     found = parameter(train, name)
     if name.startswith(ELECTRONICS):
@@ -67,23 +67,23 @@ def verdict(train: Train, grid: Grid, name: str, how: How | None = None) -> Verd
 
 
 def following(chain: Chain, name: str) -> Collection[str]:
-    """The numbers of the plan (`vcc.plan.model.Plan.parameters`) that change where a parameter does.
+    """The numbers of the plan (`vcc.plan.model.Plan.parameters`) that depend on a parameter.
 
     Args:
-        chain: from parameters to plans, as learning begins.
+        chain: from parameters to plans, when learning begins.
         name: of the parameter.
 
     Raises:
-        InputError: they do not follow it.
+        InputError: the numbers do not follow the parameter.
     """
     here = read(chain.train, name)
-    # Each of its numbers by another amount, so that no changes make up for one another.
+    # A different step for each number, so that changes do not cancel.
     some = STEP * scale(chain.train, name) * np.random.default_rng(0).uniform(0.5, 1.0, here.shape)
     start = chain.plan().parameters()
     for moved in (here + some, here - some):
         try:
             numbers = chain.plan({name: moved}).parameters()
-        except InputError:  # at an end of what its element takes, or of what was decided
+        except InputError:  # at a limit of the element or of the choices
             continue
         return [number for number, value in numbers.items() if not np.array_equal(value, start[number])]
     return chain.followed()[name]

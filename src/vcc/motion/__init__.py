@@ -1,4 +1,4 @@
-"""Cameras and light that change while a sensor gathers it: courses over time, exposures, light-field videos.
+"""Cameras and light that change during an exposure: courses over time, exposures, light-field videos.
 
 ::
 

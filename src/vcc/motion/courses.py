@@ -1,4 +1,4 @@
-"""What something is at each time: functions, steps, and lines between points."""
+"""Courses, values as functions of time: Python functions, steps, and lines between points."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vcc.base.values import Value
 
 @runtime_checkable
 class Course(Protocol):
-    """What something is at each time. Integrals are cut at its breaks, and are taken to be smooth in between."""
+    """A value as a function of time. Integrals are split at its breaks; in between it must be smooth."""
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -26,7 +26,7 @@ class Course(Protocol):
         ...
 
     def __call__(self, time: float) -> Any:
-        """What it is at a time, seconds."""
+        """The value at a time, seconds."""
         ...
 
 
@@ -35,11 +35,11 @@ class Function(Brief):
     """A function of time.
 
     Args:
-        function: from seconds to what there is then.
+        function: from seconds to the value.
         breaks: times at which it jumps or bends, seconds, ascending.
 
     Raises:
-        InputError: what is no function; breaks that do not ascend.
+        InputError: not a function; breaks that do not ascend.
     """
 
     function: Callable[[float], Any]
@@ -54,20 +54,20 @@ class Function(Brief):
         object.__setattr__(self, "breaks", _times(self.breaks))
 
     def __call__(self, time: float) -> Any:
-        """What it is at a time, seconds."""
+        """The value at a time, seconds."""
         return self.function(time)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Steps(Brief, Value):
-    """One value after the other: each from its time on until the next one's.
+    """One value after the other: each is valid from its time until the next one's.
 
     Args:
-        times: seconds, ascending. Before the first, there is what is there at the first.
-        values: as many.
+        times: seconds, ascending. The first value is also valid before its time.
+        values: one per time.
 
     Raises:
-        InputError: times that do not ascend, or as many values as there are not times.
+        InputError: times that do not ascend, or another number of values.
     """
 
     times: Sequence[float]
@@ -80,25 +80,25 @@ class Steps(Brief, Value):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """When one value follows another."""
+        """The times at which the value switches."""
         return tuple(self.times)[1:]
 
     def __call__(self, time: float) -> Any:
-        """The value of a time, seconds."""
+        """The value at a time, seconds."""
         return self.values[max(bisect_right(self.times, time) - 1, 0)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Lines(Brief, Value):
-    """Numbers that go evenly from each time's to the next one's, and stay as they are before and after.
+    """Linear interpolation between numbers at given times, constant before and after.
 
     Args:
         times: seconds, ascending.
-        values: as many numbers, or pairs of numbers such as ``(0, 2 * mm)`` for what has an x and a y.
+        values: one number per time, or one pair such as ``(0, 2 * mm)`` for parameters with x and y.
 
     Raises:
-        InputError: times that do not ascend, as many values as there are not times, values that are no numbers, or
-            some that are pairs and some that are not.
+        InputError: times that do not ascend, another number of values, values that are not numbers, or a
+            mixture of numbers and pairs.
     """
 
     times: Sequence[float]
@@ -117,7 +117,7 @@ class Lines(Brief, Value):
         return tuple(self.times)
 
     def __call__(self, time: float) -> float | tuple[float, ...]:
-        """The number of a time, seconds, or the numbers."""
+        """The number at a time, seconds, or the numbers."""
         after = bisect_right(self.times, time)
         if after in (0, len(self.times)):
             return self.values[0 if after == 0 else -1]
@@ -130,14 +130,15 @@ class Lines(Brief, Value):
 
 
 def coded(code: str | Iterable[float], exposure: float) -> Steps:
-    """A shutter that opens and shuts by a code, in equal parts of an exposure (Raskar et al. 2006).
+    """A coded shutter, open or closed in equal parts of an exposure (Raskar et al. 2006).
 
     Args:
-        code: such as ``"1101"``, or what share of the light passes in each part, 0 to 1.
-        exposure: of the whole, seconds.
+        code: such as ``"1101"``, or the transmission in each part, 0 to 1.
+        exposure: total duration, seconds.
 
     Raises:
-        InputError: an empty code, letters other than 0 and 1, numbers outside 0 to 1, no exposure.
+        InputError: an empty code, characters other than 0 and 1, numbers outside 0 to 1, an exposure of 0 or
+            less.
     """
     length = checks.above_zero("exposure", exposure, unit="s")
     if isinstance(code, str) and set(code) - {"0", "1"}:
@@ -149,27 +150,27 @@ def coded(code: str | Iterable[float], exposure: float) -> Steps:
 
 
 def code_of(steps: Steps) -> tuple[str, float] | None:
-    """The code of a shutter that opens and shuts in equal parts, and the exposure, seconds; None for others."""
+    """The code of a coded shutter and its exposure, seconds; None for other steps."""
     count = len(steps.times)
     if count < 2 or not all(isinstance(each, int | float) and each in (0, 1) for each in steps.values):
         return None
     code = "".join(str(int(each)) for each in steps.values)
-    # Either may have lost its last digit
+    # Both estimates of the exposure may be off in the last digit.
     lengths = [count * steps.times[1], count / (count - 1) * steps.times[-1]]
     return next(((code, each) for each in lengths if each > 0 and coded(code, each).times == steps.times), None)
 
 
 def course(given: Any) -> Course:
-    """What is given, as a course: functions are smooth.
+    """Convert to a course; a function is assumed to be smooth.
 
     Raises:
-        InputError: what is none.
+        InputError: not a course or function.
     """
     return given if isinstance(given, Course) else Function(given)
 
 
 def pieces(start: float, stop: float, breaks: Iterable[float]) -> list[tuple[float, float]]:
-    """The parts of an interval between breaks; those within rounding of each other or of its ends count once."""
+    """The parts of an interval between breaks; equal breaks (up to rounding) are merged."""
     least = 1e-12 * max(abs(start), abs(stop))
     ends = [start]
     for each in sorted(breaks):
@@ -187,7 +188,7 @@ def _times(given: Iterable[float]) -> tuple[float, ...]:
 
 
 def _numbers(given: Any) -> float | tuple[float, ...]:
-    """A number as it is, several as a tuple."""
+    """A number as a float, several as a tuple."""
     if isinstance(given, str) or np.ndim(given) == 0:
         return float(checks.finite("a value of Lines", given))
     return tuple(float(checks.finite("a number of a value of Lines", each)) for each in given)

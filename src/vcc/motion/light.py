@@ -1,4 +1,4 @@
-"""The light that falls on a camera over time: one light field, frames, or a function of time."""
+"""The light before a camera over time: one light field, frames, or a function of time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vcc.motion.video import LightFieldVideo
 from vcc.store.video_reading import StoredVideo
 
 Part = tuple[Any, Callable[[], Any], float]
-"""What tells it from others, how to have it, and its share."""
+"""(key, function that returns the light field, share)."""
 
 
 class Light(Protocol):
@@ -27,15 +27,15 @@ class Light(Protocol):
         ...
 
     def check_lasts(self, start: float, stop: float) -> None:
-        """Refuse times at which there is none.
+        """Check that there is light during an interval.
 
         Raises:
-            InputError: there are such.
+            InputError: there is none at some time.
         """
         ...
 
     def at(self, time: float) -> list[Part]:
-        """The light fields of a time, and their shares."""
+        """The light fields at a time, and their shares."""
         ...
 
 
@@ -88,10 +88,10 @@ class _Made(Brief):
 
 
 def light_of(given: Any) -> Light:
-    """What is given, as light over time.
+    """Convert to light over time.
 
     Raises:
-        InputError: what is none.
+        InputError: not a light field, video or function.
     """
     if isinstance(given, StoredVideo):
         return _Frames(LightFieldVideo(given, given.times, given.between))

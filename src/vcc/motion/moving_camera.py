@@ -1,4 +1,4 @@
-"""A camera whose parameters are functions of time, and what it gathers while its shutter is open."""
+"""A camera whose parameters are functions of time, and the image that it records during an exposure."""
 
 from __future__ import annotations
 
@@ -34,31 +34,30 @@ from vcc.plan.how import How, Options
 from vcc.store.video_reading import StoredVideo
 
 TOLERANCE = 2e-3
-"""Of a picture's mean: half of what a step of 8 bits is of white."""
+"""As a share of the image's mean: half of an 8-bit step relative to white."""
 KEPT = 2**28
-"""Bytes of pictures that are kept, in case the same light falls through the same camera again; half as many are
-made together."""
+"""Bytes of images that are kept for repeated states of camera and light; half of it limits a batch."""
 
 State = tuple[Camera, Any]
-"""A camera, and what tells the light field before it from others."""
+"""A camera, and the key of the light field before it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MovingCamera(Brief):
     """A camera that changes while its sensor gathers light.
 
-    Times count from when the exposure begins.
+    Times count from the start of the exposure.
 
     Args:
-        camera: as it is but for what changes.
-        courses: names of parameters, as sweeps and learning have them (``"sensor.z"``, ``"code.pattern"``,
-            ``"code.decentre"``), and what they are at each time: a function from seconds to what the camera takes
-            (SI units), or `Steps` or `Lines`.
-        shutter: the share of the light that passes, 0 to 1, likewise; None is open all the time.
+        camera: provides all parameters that do not change.
+        courses: names of parameters, as in sweeps and learning (``"sensor.z"``, ``"code.pattern"``,
+            ``"code.decentre"``), and their values over time: a function from seconds to a value that the
+            camera accepts (SI units), or `Steps` or `Lines`.
+        shutter: the transmission of the shutter, 0 to 1, likewise; None for always open.
 
     Raises:
-        InputError: a parameter that there is not (those that there are are listed), or what is no course; what the
-            camera refuses at the beginning.
+        InputError: unknown parameter (the message lists the available ones), or not a course; initial values
+            that the camera rejects.
     """
 
     camera: Camera
@@ -79,10 +78,10 @@ class MovingCamera(Brief):
         self.at(0.0)
 
     def at(self, time: float) -> Camera:
-        """The camera at a time after the exposure began, seconds.
+        """The camera at a time after the start of the exposure, seconds.
 
         Raises:
-            InputError: what it does not take then, with the time.
+            InputError: the camera rejects its values at that time; the message contains the time.
         """
         if not self.courses:
             return self.camera
@@ -90,10 +89,10 @@ class MovingCamera(Brief):
             return replaced(self.camera, {name: each(time) for name, each in self.courses.items()})
 
     def open_at(self, time: float) -> float:
-        """The share of the light that the shutter lets through, 0 to 1.
+        """The transmission of the shutter, 0 to 1.
 
         Raises:
-            InputError: the shutter gives no such number.
+            InputError: the value of the shutter is not such a number.
         """
         if self.shutter is None:
             return 1.0
@@ -101,28 +100,28 @@ class MovingCamera(Brief):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """When something of it jumps or bends, seconds."""
+        """Times at which a parameter or the shutter jumps or bends, seconds."""
         changing: list[Any] = [*self.courses.values(), *([] if self.shutter is None else [self.shutter])]
         return tuple(sorted({time for each in changing for time in each.breaks}))
 
     def listed(self) -> list[str]:
-        """What changes, each in a line of its own: ``"sensor.z goes evenly, 51 mm at 0 s, 53 mm at 90 ms"``."""
+        """The changing parameters, one per line: ``"sensor.z goes evenly, 51 mm at 0 s, 53 mm at 90 ms"``."""
         found = {name: (each, place(self.camera, name)) for name, each in self.courses.items()}
         lines = [f"{name} {course_in_words(*each)}" for name, each in found.items()]
         return [*lines, *([] if self.shutter is None else [f"shutter {course_in_words(self.shutter)}"])]
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write this camera as a TOML file that `vcc.motion.load_moving_camera` reads back.
+        """Write this camera as a TOML file for `vcc.motion.load_moving_camera`.
 
-        That gives one back that is the same at all times. See `vcc.camera_file.save_camera` for what stands beside
-        the file.
+        Loading it returns a camera that is equal at all times. See `vcc.camera_file.save_camera` for further
+        files that may be written.
 
         Args:
-            path: where to; an older file of that name is replaced.
+            path: the file; an older file of that name is replaced.
 
         Raises:
-            InputError: a function of time or anything else that a file cannot hold (`Lines` and `Steps` it holds),
-                or a folder that cannot be written to.
+            InputError: a function of time or anything else that a file cannot hold (`Lines` and `Steps` are
+                supported), or a folder that cannot be written to.
         """
         write_moving(self.camera, self.courses, self.shutter, path)
 
@@ -136,7 +135,7 @@ class MovingCamera(Brief):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Explanation:
-        """What changes, in words, and `vcc.Camera.explain` of the moment at which the exposure begins.
+        """The changing parameters as text, followed by `vcc.Camera.explain` for the start of the exposure.
 
         Args:
             light_field: as in `capture`.
@@ -147,10 +146,10 @@ class MovingCamera(Brief):
             options: as in `capture`.
 
         Returns:
-            Text; its plan, and the seconds that are estimated, are those of this moment.
+            Text; its plan and its estimated seconds apply to the start of the exposure.
 
         Raises:
-            InputError: as `vcc.Camera.explain`; a video that has not begun then, or is over.
+            InputError: as `vcc.Camera.explain`; a video that does not contain the start.
         """
         light = light_of(light_field)
         light.check_lasts(start, start)
@@ -181,41 +180,43 @@ class MovingCamera(Brief):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Image:
-        """The picture that the sensor gathers over an exposure.
+        """The image that the sensor gathers over an exposure.
 
-        It is (1/T)·∫ q(t)·E(t) dt over the exposure T, with the shutter's q and the irradiance E that the camera
-        of each moment would record: a camera that stands still with its shutter open gives what
-        `vcc.Camera.capture` gives, and `vcc.expose_image` with the same exposure time records it. Each pixel
-        gathers what falls on it, wherever it is moved.
+        It is (1/T)·∫ q(t)·E(t) dt over the exposure T, with the shutter's q and the irradiance E that the
+        camera of each moment would record. For a static camera with an open shutter the result is that of
+        `vcc.Camera.capture`, and `vcc.expose_image` with the same exposure time records it. Each pixel
+        gathers the light that reaches it wherever it moves.
 
-        The integral is cut where something switches, bends or a frame ends, and refined in each part until its
-        estimated error is small enough (`vcc.motion.quadrature.mean_over`). Pictures of the same camera before the
-        same frame are made once; what switches in steps costs one for each state. Others before the same light
-        field are made together, as those of a sweep (`vcc.sweep`): what they can share is done once.
+        The integral is split where a value switches or bends and at frames, and each part is refined until
+        its estimated error is small enough (`vcc.motion.quadrature.mean_over`). Images of the same camera and
+        frame are computed once; steps cost one image per state. Other images of the same light field are made
+        in batches that share work, as in a sweep (`vcc.sweep`).
 
         Args:
-            light_field: one that stays, a video, or a function from seconds to a light field; all of one shape.
-            exposure: T, seconds; 0 for the picture of the moment at which it begins.
+            light_field: a static one, a video, or a function from seconds to a light field; all of one shape.
+            exposure: T, seconds; 0 for the image at the start of the exposure.
             how: as in `vcc.Camera.capture`.
-            start: when the exposure begins, in the time of the video or function, seconds.
+            start: start of the exposure, in the time of the video or function, seconds.
             time_tolerance: refine until the estimated error of the mean over time, root mean square over the
-                pixels, is at most this share of the picture's mean, with up to 729 moments of each part.
-            executor: as in `vcc.Camera.capture`: who runs the blocks of a stored light field, for one moment after
-                the other. None makes the pictures here; each block is then read once for moments made together.
+                pixels, is at most this share of the image's mean, with up to 729 moments in each part.
+            executor: as in `vcc.Camera.capture`: runs the blocks of a stored light field, for one moment
+                after the other. None makes the images in this process; each block is then read once for all
+                moments of a batch.
             progress: called with (done, total) in parts of the exposure.
             options: as in `vcc.Camera.capture`.
 
         Returns:
-            Irradiance, radiance × steradian, in the frame of the camera as it was given. Its ``sampling_error`` is
-            the estimated error of rays and moments together. Where rays are traced, each picture takes others
-            (``seed``, ``seed`` + 1, …).
+            Irradiance, radiance × steradian, in the frame of the camera as it was given. Its
+            ``sampling_error`` is the estimated error of rays and moments together. If rays are traced, each
+            image uses other rays (``seed``, ``seed`` + 1, …).
 
         Warns:
-            ResultWarning: the tolerance was not reached; what `vcc.Camera.capture` warns of, once for each kind.
+            ResultWarning: the tolerance was not reached; also the warnings of `vcc.Camera.capture`, once for
+            each kind.
 
         Raises:
-            InputError: an exposure below 0, a video that does not last that long, a shutter that lets through less
-                than 0 or more than 1; what the camera refuses at a time, or what `vcc.Camera.capture` refuses.
+            InputError: an exposure below 0, a video that is too short, a transmission of the shutter below 0
+                or above 1; values that the camera rejects at some time; see also `vcc.Camera.capture`.
         """
         length = checks.zero_or_more("exposure", exposure, unit="s")
         begun = checks.finite("start", start, "seconds")
@@ -228,12 +229,12 @@ class MovingCamera(Brief):
 
 @dataclass(frozen=True, eq=False)
 class _Gathered:
-    """Irradiance and what is known of it, in double precision: what is added over time.
+    """Irradiance with its errors, in double precision, as a term of the sum over time.
 
     Args:
         values: irradiance.
-        missing_rays: their share.
-        errors: of sampling, of each picture that it is made of, by its number: those of two are independent.
+        missing_rays: share of missing rays.
+        errors: sampling errors by the number of the image; errors of different images are independent.
     """
 
     values: NDArray[np.float64]
@@ -263,7 +264,7 @@ class _Gathered:
 
     @property
     def sampling_error(self) -> float:
-        """Of all pictures together."""
+        """The root of the sum of squared errors of all images."""
         return math.hypot(*self.errors.values())
 
     def size(self) -> float:
@@ -274,7 +275,7 @@ class _Gathered:
 
 
 class _Work:
-    """One exposure: pictures of moments, those of the last states kept."""
+    """One exposure: images of moments, with a cache of the latest states."""
 
     def __init__(self, moving: MovingCamera, light: Light, start: float, how: How, executor: Any) -> None:
         self._moving, self._light, self._start, self._how = moving, light, start, how
@@ -285,7 +286,7 @@ class _Work:
     def gathered(self, exposure: float, tolerance: float, progress: Progress | None) -> Image:
         breaks = (*self._moving.breaks, *(time - self._start for time in self._light.breaks))
         parts = pieces(0.0, exposure, breaks)
-        for begin, _ in parts:  # before long work
+        for begin, _ in parts:  # fail before long work
             self._parts(begin)
         total, error, reached, passed = None, 0.0, True, 0.0
         for done, (begin, end) in enumerate(parts, start=1):
@@ -307,7 +308,7 @@ class _Work:
         return self._image(total, error, passed)
 
     def at_once(self) -> Image:
-        """Of the moment at which the exposure begins."""
+        """The image at the start of the exposure."""
         found = next(self._moments([0.0]))
         self._remarks.say(self._made, "moments")
         return self._image(found, 0.0, self._moving.open_at(0.0))
@@ -323,7 +324,7 @@ class _Work:
         )
 
     def _moments(self, times: Sequence[float]) -> Iterator[_Gathered]:
-        """What falls on the sensor at times after the exposure began, some of them made together."""
+        """The irradiance at times after the start of the exposure, computed in batches."""
         done = 0
         while done < len(times):
             asked = [self._parts(time) for time in times[done : done + self._at_once]]
@@ -334,7 +335,7 @@ class _Work:
                 yield _sum([made[state] * share for state, _, share in parts]) if parts else self._dark
 
     def _parts(self, time: float) -> list[tuple[State, Callable[[], Samples], float]]:
-        """The cameras and light fields of a time, and their shares; none while the shutter is shut."""
+        """The cameras and light fields at a time, and their shares; empty while the shutter is closed."""
         through = self._moving.open_at(time)
         if through == 0:
             return []
@@ -354,11 +355,11 @@ class _Work:
         return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, {})
 
     def _pictures(self, wanted: Mapping[State, Callable[[], Samples]]) -> dict[State, _Gathered]:
-        """The pictures of cameras and light fields, each made once while it is kept."""
+        """The images of cameras and light fields, each computed once while it is in the cache."""
         there = {state: self._kept[state] for state in wanted if state in self._kept}
         for state in there:
             self._kept.move_to_end(state)
-        # Other rays for each picture: their errors even out.
+        # Different rays for each image, so that their errors average out.
         numbers = {state: self._made + n for n, state in enumerate(each for each in wanted if each not in there)}
         for light in dict.fromkeys(light for _, light in numbers):
             states = [state for state in numbers if state[1] == light]
@@ -371,7 +372,7 @@ class _Work:
         return there
 
     def _captured(self, states: Sequence[State], samples: Samples, numbers: Sequence[int]) -> list[Image]:
-        """The pictures of cameras before one light field, by rays of their own numbers."""
+        """The images of cameras before one light field, each by rays of its own seed."""
         cameras, seeds = [camera for camera, _ in states], [self._how.seed + number for number in numbers]
         if self._executor is None and len(cameras) > 1:
             return captured_in_batches(cameras, samples, self._how, seeds=seeds)
@@ -381,7 +382,7 @@ class _Work:
         ]
 
     def _forget(self) -> None:
-        """Let go of the pictures that were wanted least lately, and see how many are made together."""
+        """Drop the least recently used images, and update the size of batches."""
         if self._kept:
             most = KEPT // next(iter(self._kept.values())).values.nbytes
             self._at_once = max(most // 2, 1)
@@ -390,7 +391,7 @@ class _Work:
 
 
 def _gathered(image: Image, number: int) -> _Gathered:
-    """A picture as it is added to others; its number tells its error from theirs."""
+    """An image as a term of the sum; its number identifies its error."""
     if not isinstance(image.values, np.ndarray):
         raise InputError(
             f"a moving camera takes samples of NumPy, not of {library_of(image.values)}, "

@@ -1,13 +1,13 @@
-"""Camera files of cameras that change over time: a table [moving] beside the elements and the sensor.
+"""Camera files of time-varying cameras: a table [moving] in addition to the elements and the sensor.
 
 ::
 
     [moving]
-    sensor.z = { name = "lines", times = ["0 ms", "90 ms"], values = ["51 mm", "53 mm"] }
-    stop.pattern = { name = "steps", times = ["0 ms", "5 ms"], values = [{ name = "open" }, "code.png"] }
-    shutter = { name = "coded", code = "1101001", exposure = "90 ms" }
+    sensor.z = { name = "lines", times = ["0 ms", "90 ms"], values = ["51 mm", "53 mm"] } stop.pattern = {
+    name = "steps", times = ["0 ms", "5 ms"], values = [{ name = "open" }, "code.png"] } shutter = { name =
+    "coded", code = "1101001", exposure = "90 ms" }
 
-Parameters go by their names, and what they are at a time is written as it is in the element's own table.
+The keys are names of parameters. Their values have the same form as in the element's own table.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ from vcc.motion.moving_camera import MovingCamera
 from vcc.motion.moving_writing import CODED, POINTED, SHUTTER
 
 FIELDS = {"name", "times", "values", "code", "exposure"}
-"""Of courses."""
+"""Fields of courses."""
 EXAMPLE = '{ name = "lines", times = ["0 ms", "90 ms"], values = ["51 mm", "53 mm"] }'
 
 
 def load_moving_camera(path: str | PathLike[str]) -> MovingCamera:
-    """The moving camera that a TOML file describes; one without a table [moving] stands still.
+    """Load a moving camera from a TOML file; without a table [moving] it is static.
 
     Args:
-        path: the file: as `vcc.load_camera` takes it, with a table ``moving``; see `vcc.motion.moving_file`.
+        path: the file: as for `vcc.load_camera`, with a table ``moving``; see `vcc.motion.moving_file`.
 
     Raises:
-        InputError: as `vcc.load_camera`; a parameter that there is not, what is no course, and what
-            `vcc.MovingCamera` refuses. The message names the file and the parameter.
+        InputError: as `vcc.load_camera`; unknown parameter, not a course; see also `vcc.MovingCamera`. The
+            message names the file and the parameter.
     """
     file = expanded(path)
     tables, beside = read_tables(file), Beside(file.parent)
@@ -78,7 +78,7 @@ def _moving(camera: Camera, table: Any, beside: Beside) -> MovingCamera:
 
 
 def _listed(given: Any, name: str = "") -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The tables of courses by the names of their parameters, which TOML takes apart at points without quotes."""
+    """The tables of courses by parameter name; TOML splits unquoted names at dots into nested tables."""
     if not isinstance(given, dict):
         raise InputError(f"{name or 'it'} is {in_toml(given)}: it is a table, such as {EXAMPLE}")
     if name and (not given or not FIELDS.isdisjoint(given)):
@@ -95,9 +95,9 @@ def _course(
 
     Args:
         given: the table.
-        what: changes, for messages.
-        read: what it is at a time, of what the file has there and a name for messages.
-        kinds: of courses that it may be.
+        what: the name of what changes, for messages.
+        read: converts a value of the file, with a name for messages.
+        kinds: the supported kinds of courses.
     """
     if "name" not in given:
         raise InputError(f"{what} has no name: write it like {EXAMPLE}")
@@ -121,12 +121,12 @@ def _each(given: Any, what: str, noun: str, read: Callable[[Any, str], Any]) -> 
 
 
 def _value(kind: type, field: str, beside: Beside, given: Any, called: str) -> Any:
-    """What a parameter is at a time."""
+    """The value of a parameter at a time."""
     return read_field(kind, field, given, called, beside)
 
 
 def _share(given: Any, called: str) -> float:
-    """What share of the light a shutter lets through."""
+    """The transmission of a shutter."""
     if not isinstance(given, int | float) or isinstance(given, bool):
         raise InputError(f"{called} is {in_toml(given)}: it is the share of the light that passes, 0 to 1")
     return checks.zero_or_more(called, given, most=1)

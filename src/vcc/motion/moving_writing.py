@@ -1,4 +1,4 @@
-"""Camera files of cameras that change over time written: the elements and the sensor, and a table [moving]."""
+"""Writes camera files of time-varying cameras: the elements and the sensor, and a table [moving]."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from vcc.learn.parameters import place
 from vcc.motion.courses import Course, Lines, Steps, code_of
 
 SHUTTER = "shutter"
-"""In the table: no parameter has that name, as these have a point in theirs."""
+"""Key in the table; no parameter has this name, because names of parameters contain a dot."""
 POINTED: dict[str, type[Lines | Steps]] = {"lines": Lines, "steps": Steps}
-"""Courses that are said by points in time, by the names that files have for them."""
+"""Courses that are defined by points in time, by their names in files."""
 CODED = "coded"
-"""The name of `vcc.motion.coded`, of shutters alone."""
+"""The name of `vcc.motion.coded`, for shutters only."""
 
 Changing = Course | Callable[[float], Any]
-"""What something is at each time."""
+"""A value as a function of time."""
 
 
 def write_moving(
@@ -34,13 +34,13 @@ def write_moving(
     """Write a moving camera as TOML; see `vcc.MovingCamera.save`.
 
     Args:
-        camera: as it is but for what changes.
+        camera: provides all parameters that do not change.
         courses: by names of parameters.
-        shutter: None is open all the time.
-        path: where to; an older file of that name is replaced.
+        shutter: None for always open.
+        path: the file; an older file of that name is replaced.
 
     Raises:
-        InputError: what a file cannot hold, or a folder that cannot be written to.
+        InputError: a file cannot hold the camera, or the folder cannot be written to.
     """
     file = expanded(path)
     tables, arrays = tables_of_train(camera, file)
@@ -68,7 +68,7 @@ def _table(course: Changing, what: str, written: Callable[[Any], Any]) -> dict[s
 
 
 def _coded_table(shutter: Changing) -> dict[str, Any] | None:
-    """A shutter that goes by a code; None for another one."""
+    """The table of a coded shutter; None for another one."""
     found = code_of(shutter) if isinstance(shutter, Steps) else None
     if found is None:
         return None

@@ -1,7 +1,8 @@
-"""The mean of pictures over an interval of time, by midpoints, until it changes little.
+"""The mean of images over an interval of time, by the midpoint rule with adaptive refinement.
 
-Midpoints of thirds hold the midpoint of the whole: each refinement keeps all pictures that there are. They are
-never at the ends, where something may just switch, and all weigh the same, so that what is never dark stays so.
+Dividing each interval into thirds keeps its midpoint, so that each refinement reuses all images. Midpoints
+are never at the ends, where a value may switch. All weights are equal and positive, so that the mean of
+positive values is positive.
 """
 
 from __future__ import annotations
@@ -15,18 +16,18 @@ from typing import Generic, Protocol, Self, TypeVar
 from vcc.base.describe import Brief
 
 LEAST, MOST = 9, 729
-"""Moments of an interval: a change tells of the error when there are two of them."""
+"""Moments of an interval, least and most: the error estimate requires two refinements."""
 
 
 class Summand(Protocol):
-    """What can be added, and weighed by numbers."""
+    """A term of a sum: supports addition, and multiplication by numbers."""
 
     def __add__(self, other: Self, /) -> Self: ...
 
     def __mul__(self, factor: float, /) -> Self: ...
 
     def size(self) -> float:
-        """Its mean, as tolerances are a share of it."""
+        """Its mean; tolerances are relative to it."""
         ...
 
     def distance(self, other: Self, /) -> float:
@@ -44,8 +45,8 @@ class Mean(Brief, Generic[Picture]):
     Args:
         value: the mean.
         error: its estimated error, root mean square, in units of the values.
-        moments: of which it is the mean.
-        reached: whether the tolerance was.
+        moments: their number.
+        reached: whether the tolerance was reached.
     """
 
     value: Picture
@@ -61,23 +62,23 @@ def mean_over(
     tolerance: float,
     most: int = MOST,
 ) -> Mean[Picture]:
-    """The mean of pictures over an interval, by 9, 27, 81, … moments.
+    """The mean of images over an interval, by 9, 27, 81, … moments.
 
-    Where the mean is approached as 1/n, as beside jumps at times that nobody told of, the error of n moments is
-    half of what the last step changed, and a sixth of what the one before it did. The larger one is taken: a step
-    may change nothing by chance. Where pictures only bend, the mean is approached as 1/n², and both are too large.
+    If the mean converges as 1/n, as with jumps at unknown times, the error of n moments is half of the last
+    change, and a sixth of the change before it. The estimate is the larger one, because a refinement may
+    change nothing by chance. If images only bend, the mean converges as 1/n², and both are too large.
 
     Args:
         start: seconds.
         stop: seconds.
-        at: the pictures of some moments, in their order; it is asked for all of a step at once, so that they can
-            be made together.
-        tolerance: the error that is good enough, as a share of the mean.
+        at: returns the images of some moments, in their order; it is called with all moments of a refinement
+            at once, so that they can be computed in batches.
+        tolerance: the acceptable error, as a share of the mean.
         most: moments, 9 or more.
     """
 
     def new(count: int) -> list[float]:
-        """Those of so many moments that the step before has not."""
+        """The new moments of a refinement to ``count`` moments."""
         numbers = (number for number in range(count) if count == 1 or number % 3 != 1)
         return [start + (number + 0.5) / count * (stop - start) for number in numbers]
 

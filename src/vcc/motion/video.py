@@ -1,4 +1,4 @@
-"""A light field that changes: frames, the times at which they were taken, and what lies between."""
+"""A light field that changes over time: frames, their times, and the interpolation between them."""
 
 from __future__ import annotations
 
@@ -19,14 +19,13 @@ class LightFieldVideo(Brief):
     """Frames of a light field over time.
 
     Args:
-        frames: light fields of one grid, in memory or on disk; each is asked for when it is needed.
+        frames: light fields of one grid, in memory or on disk; each is accessed when it is needed.
         times: of the frames, seconds, ascending.
-        between: ``"linear"``: what lies between two frames is mixed of them by time, and the video lasts from the
-            first to the last; ``"held"``: each frame stays until the next, the last one for as long as the one
-            before it.
+        between: ``"linear"``: linear interpolation between frames, and the video lasts from the first to the
+            last; ``"held"``: each frame lasts until the next, and the last one as long as the one before it.
 
     Raises:
-        InputError: as many times as there are not frames, times that do not ascend; fewer than two frames.
+        InputError: different numbers of times and frames, times that do not ascend; fewer than two frames.
     """
 
     frames: Sequence[Samples]
@@ -53,17 +52,17 @@ class LightFieldVideo(Brief):
 
     @property
     def stop(self) -> float:
-        """When it ends, seconds."""
+        """The end of the video, seconds."""
         last = self.times[-1]
         return last if self.between == "linear" else last + (last - self.times[-2])
 
     def check_lasts(self, start: float, stop: float) -> None:
-        """Refuse times before the first frame or after the end.
+        """Check that the video covers an interval.
 
         Raises:
-            InputError: there are such.
+            InputError: it starts before the first frame, or stops after the end.
         """
-        least = 1e-9 * (stop - start)  # rounding of sums of times
+        least = 1e-9 * (stop - start)  # tolerance for rounding of sums of times
         if start < self.times[0] - least or stop > self.stop + least:
             if start == stop:
                 raise InputError(
@@ -75,7 +74,7 @@ class LightFieldVideo(Brief):
             )
 
     def shares(self, time: float) -> list[tuple[int, float]]:
-        """The frames of a time, and their shares, which sum to 1."""
+        """The frames at a time, and their shares, which sum to 1."""
         after = min(max(bisect_right(self.times, time), 1), len(self.times))
         if self.between == "held" or after == len(self.times):
             return [(after - 1, 1.0)]

@@ -1,4 +1,4 @@
-"""What changes over time, in words."""
+"""Courses over time as text."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from vcc.learn.parameters import Parameter
 from vcc.motion.courses import Lines, Steps, code_of
 
 MOST = 4
-"""Points in time that are told one by one; of more, the first and the last."""
+"""Largest number of points that are listed completely; otherwise the first and the last."""
 
 
 def course_in_words(course: Any, of: Parameter | None = None) -> str:
-    """What something is at each time.
+    """A course as text.
 
     Args:
-        course: what it is.
-        of: the parameter that changes, whose numbers have a unit; None for a shutter.
+        course: of a parameter, or of a shutter.
+        of: the parameter, for the unit of its values; None for a shutter.
     """
     if isinstance(course, Lines):
         return "goes evenly, " + _points(course, of, "{value} at {time}")

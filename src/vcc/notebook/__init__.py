@@ -1,8 +1,8 @@
-"""What things show of themselves at the end of a notebook's cell: pictures, drawings, tables, words.
+"""Displays of objects at the end of a notebook cell: images, drawings, tables, text.
 
-`exhibit` makes it of a thing; things ask for it by `vcc.base.showing.Shown`. One exhibit takes at most
-`vcc.notebook.pictures.MOST_BYTES` of PNG and `vcc.notebook.html.LONGEST` letters, so that a notebook's file stays
-small: HTML and the PNG beside it take at most 1.4 MB together, and mostly two or three tenths of one.
+`exhibit` creates the display of an object, on request of `vcc.base.showing.Shown`. One display has at most
+`vcc.notebook.pictures.MOST_BYTES` of PNG and `vcc.notebook.html.LONGEST` characters, to limit the size of
+notebook files: HTML and its PNG take at most 1.4 MB together, and mostly 0.2 to 0.3 MB.
 """
 
 from vcc.notebook.exhibits import exhibit as exhibit

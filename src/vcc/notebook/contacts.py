@@ -1,4 +1,4 @@
-"""Contact sheets: some views of a light field, some pictures of a focal stack, side by side at one exposure."""
+"""Contact sheets: views of a light field, or images of a focal stack, side by side at one exposure."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from vcc.recover import FocalStack
 from vcc.store import StoredLightField
 
 MOST_ACROSS, MOST_IN_A_ROW = 5, 8
-"""Views shown along each axis; where there is one row or column of them, along it."""
+"""Views shown along each axis, and along a single row or column."""
 SHEET_SIDE = 520
-"""Pixels of a sheet: many small pictures of detail do not pack well."""
+"""Side of a sheet, pixels: many small pictures with detail compress badly."""
 MOST_READ = 2**26
-"""Bytes of samples that are looked at for a sheet: of larger views fewer are shown."""
+"""Bytes of samples that are read for a sheet; if views are larger, fewer are shown."""
 
 Array = NDArray[Any]
 
 
 def contact_panel(light_field: LightField | StoredLightField) -> Panel:
-    """Views of a light field, evenly spread over the whole of it; of a store, no others are read."""
+    """A selection of views, evenly spread over the light field; only these are read from a store."""
     rows, columns = light_field.shape[:2]
     chosen = _chosen(rows, columns, 4 * math.prod(light_field.shape[2:]))
     missing = set(light_field.missing()) if isinstance(light_field, StoredLightField) else set()
@@ -47,7 +47,7 @@ def contact_panel(light_field: LightField | StoredLightField) -> Panel:
 
 
 def strip_panel(stack: FocalStack) -> Panel:
-    """Pictures of a focal stack in a row, from the first to the last."""
+    """Images of a focal stack in a row, from the first to the last."""
     chosen = spread(len(stack.pictures), MOST_ACROSS)
     distances = ", ".join(_away(stack.distances[number]) for number in chosen)
     some = f"{len(chosen)} of {len(stack.pictures)}, " if len(chosen) < len(stack.pictures) else ""
@@ -56,7 +56,7 @@ def strip_panel(stack: FocalStack) -> Panel:
 
 
 def _chosen(rows: int, columns: int, bytes_of_one: int) -> tuple[list[int], list[int]]:
-    """Which rows and columns of views are shown."""
+    """The rows and columns of the views to show."""
     most = MOST_IN_A_ROW if 1 in (rows, columns) else MOST_ACROSS
     while most > 1 and min(rows, most) * min(columns, most) * bytes_of_one > MOST_READ:
         most -= 1
@@ -79,7 +79,7 @@ def _away(distance: float) -> str:
 
 
 def _panel(places: Sequence[Sequence[Any]], picture: Callable[[Any], Array | None], caption: str) -> Panel:
-    """Pictures at places, each averaged down as soon as it is there."""
+    """A panel of pictures at places, each averaged down as soon as it is read."""
     factor, made = 0, list[list[Array | None]]()
     for row in places:
         made.append([])
@@ -103,7 +103,7 @@ def _panel(places: Sequence[Sequence[Any]], picture: Callable[[Any], Array | Non
 
 
 def _factor(shape: tuple[int, ...], down: int, across: int) -> int:
-    """By which pictures of a sheet are averaged so that it fits."""
+    """The factor by which pictures of a sheet are averaged so that it fits."""
     rows, columns = shape
     room = [(SHEET_SIDE + GAP) / count - GAP for count in (down, across)]
     return max(math.ceil(rows / room[0]), math.ceil(columns / room[1]), 1)

@@ -1,4 +1,4 @@
-"""The exhibit of each kind of thing. What is not named here shows its own words, as on the command line."""
+"""The display of each kind of object. Other objects show their `repr`, as in the terminal."""
 
 from __future__ import annotations
 
@@ -51,27 +51,27 @@ from vcc.store import StoredLightField
 from vcc.sweeps import Sweep, contact_sheet
 
 FRONT = 256
-"""Points a side at which patterns, kernels and surfaces are looked at from the front."""
+"""Points along a side for front views of patterns, kernels and surfaces."""
 SWEPT_ROWS = 12
-"""Of a sweep's table."""
+"""Rows shown of a sweep's table."""
 MOST_PICTURES = 6
-"""Of a result of the gallery."""
+"""Pictures shown of a gallery result."""
 SIDE_BY_SIDE = 270
-"""Width at which they are shown, pixels."""
+"""Their width, pixels."""
 PERIODS = 6
-"""Of a pattern without a bound, so many are shown where it has a period."""
+"""Periods shown of an unbounded periodic pattern."""
 
 
 @singledispatch
 def exhibit(thing: Any) -> Exhibit:
-    """What is shown of a thing: here its own words, the first line as a heading."""
+    """The display of an object; the default is its `repr` with the first line as a heading."""
     first, _, rest = repr(thing).partition("\n")
     title, words = _parted(first)
     return Exhibit(title, words, text=rest)
 
 
 def _parted(line: str) -> tuple[str, str]:
-    """The name and what stands in brackets behind it; a line without brackets is a name."""
+    """The name and the text in parentheses after it; a line without parentheses is a name."""
     found = re.fullmatch(r"(\w+)\((.*)\)", line)
     return (found[1], found[2]) if found else (line, "")
 
@@ -96,7 +96,7 @@ def _(recording: Recording) -> Exhibit:
 
 
 def _light(image: Image, share: int = 1) -> tuple[Panel, ...]:
-    """A picture, turned upright; none where there is nothing to look at, as under a tracer."""
+    """The panel of an upright image; empty if it has no values, as under a tracer."""
     if not has_values(image.values):
         return ()
     return (light_panel(image.upright().to_numpy(), "turned upright" if image.inverted else "", share),)
@@ -137,7 +137,7 @@ def _(swept: Sweep) -> Exhibit:
     return Exhibit(*_parted(first), panels, Table((*names, *swept.numbers), rows), text=more)
 
 
-# --- cameras and what they are made of ---
+# --- cameras and their parts ---
 
 
 @exhibit.register
@@ -175,12 +175,12 @@ def _patterns(element: Element) -> list[Pattern]:
 
 
 def _is_patterned(pattern: Pattern) -> bool:
-    """Whether there is more to see than the rim of a sheet or a lens."""
+    """Whether the pattern shows more than the rim of a sheet or a lens."""
     return not isinstance(pattern, Circle) and float(np.ptp(_transmission(pattern)[0])) > 0
 
 
 def _drawing(draw: Callable[[], Any], caption: str = "") -> tuple[tuple[Panel, ...], str]:
-    """A drawing, and words instead where an element of a user's does not do what it must."""
+    """A drawing, or the error message if a user's element is invalid."""
     try:
         return (drawn(draw, caption),), ""
     except InputError as error:
@@ -195,7 +195,7 @@ def _(thing: Any) -> Exhibit:
 
 
 def _inside(thing: Any) -> str:
-    """What a sensor's electronics are."""
+    """The parameters of a sensor's electronics."""
     electronics = getattr(thing, "electronics", None)
     if electronics is None:
         return ""
@@ -242,7 +242,7 @@ def _kind(thing: Any) -> str:
 
 
 def _front(pattern: Pattern) -> Panel:
-    """What a pattern lets through, from the front: x to the right, y down."""
+    """The transmission of a pattern, seen from the front: x to the right, y down."""
     values, size = _transmission(pattern)
     caption = f"from the front, {size}; white lets all light through"
     panel = codes_panel(values, lambda part: np.rint(np.clip(part, 0, 1) * 255).astype(np.uint8), caption, share=2)
@@ -250,7 +250,7 @@ def _front(pattern: Pattern) -> Panel:
 
 
 def _transmission(pattern: Pattern) -> tuple[NDArray[np.float64], str]:
-    """Means over the points of a raster, and the size of what is looked at, in words."""
+    """Means over the cells of a raster, and the size of the area as text."""
     period = getattr(getattr(pattern, "pattern", pattern), "period", None)
     periods = [each for each in np.ravel(period if period is not None else ()) if math.isfinite(each)]
     width, height = _bounded(pattern.size, PERIODS * max(periods) if periods else 2 * UNBOUNDED)
@@ -259,13 +259,13 @@ def _transmission(pattern: Pattern) -> tuple[NDArray[np.float64], str]:
 
 
 def _bounded(size: tuple[float, float], otherwise: float = 2 * UNBOUNDED) -> tuple[float, float]:
-    """A size without infinities."""
+    """A size with infinities replaced."""
     width, height = (each if math.isfinite(each) else otherwise for each in size)
     return width, height
 
 
 def _raster(width: float, height: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The middles of `FRONT` cells along the longer side, and of squares as large along the other: x and y."""
+    """Centres of square cells, `FRONT` along the longer side: x and y."""
     cell = max(width, height) / FRONT
     columns, rows = (max(round(side / cell), 1) for side in (width, height))
     x, y = (((np.arange(n) + 0.5) / n - 0.5) * side for n, side in ((columns, width), (rows, height)))
@@ -276,7 +276,7 @@ def _size_in_words(width: float, height: float) -> str:
     return f"{short(width, digits=3)} × {short(height, digits=3)}"
 
 
-# --- words ---
+# --- text ---
 
 
 @exhibit.register
@@ -295,7 +295,7 @@ def _(saved: SavedPicture) -> Exhibit:
     return Exhibit("SavedPicture", saved.description)
 
 
-# --- what is found ---
+# --- results ---
 
 
 @exhibit.register
@@ -357,7 +357,7 @@ def _(result: Result) -> Exhibit:
 
 
 def _of_gallery(picture: Picture, share: int) -> Panel:
-    """A picture of the gallery's, as screens want it, or a figure."""
+    """A picture of the gallery, as an array for display or as a figure."""
     if not isinstance(picture.content, np.ndarray):
         return drawn(lambda: picture.content, picture.title, share)
     panel = codes_panel(

@@ -1,7 +1,8 @@
-"""Exhibits as HTML that reads well in light and dark notebooks, written with a few small functions.
+"""Displays as HTML for light and dark notebooks, written with a few small functions.
 
-Colours are the notebook's own: text inherits them, lines are half transparent, and drawings, which are dark on
-white, bring their white with them. Styles stand at the elements: some hosts drop style sheets from outputs.
+Colours follow the notebook: text inherits its colour, and lines are half transparent. Drawings, which are
+dark on white, have a white background of their own. Styles are inline, because some hosts drop style sheets
+from outputs.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from html import escape
 from vcc.base.cached import cached
 
 LONGEST = 16_000
-"""Letters of text in an exhibit; of a longer one the rest is left out, and that is said."""
+"""Characters of text in a display; longer text is truncated with a note."""
 MOST_ROWS = 60
-"""Of a table, likewise."""
+"""Rows of a table, likewise."""
 
 _LINE = "1px solid rgba(128,128,128,0.35)"
 _QUIET = "opacity:0.7"
@@ -25,15 +26,15 @@ _CELL = f"padding:2px 14px 2px 0;text-align:left;vertical-align:top;border:0;bor
 
 @dataclass(frozen=True)
 class Panel:
-    """A picture with what it shows.
+    """A picture with its caption.
 
     Args:
         png: the file.
-        width: at which it is shown, in pixels of CSS, where there is room.
+        width: its preferred width, CSS pixels.
         caption: below it.
-        pixelated: whether its pixels are to be seen as squares where it is magnified.
-        paper: whether it is dark on nothing, and wants white paper below it.
-        framed: whether it has a frame, without which it could not be told from a white page.
+        pixelated: whether its pixels appear as squares when magnified.
+        paper: whether it is dark and transparent, and needs a white background.
+        framed: whether it has a frame, to stand out on a white page.
     """
 
     png: bytes
@@ -46,7 +47,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of words below a heading for each column."""
+    """Rows of text below a heading for each column."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -54,14 +55,14 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """What is shown of a thing, from top to bottom.
+    """The display of an object, from top to bottom.
 
     Args:
-        title: what it is.
-        words: of it, in a line.
-        panels: side by side, where there is room.
+        title: the kind of object.
+        words: a description in one line.
+        panels: side by side, if there is enough space.
         table: of its parameters.
-        text: set as it is, its lines without an indent as headings.
+        text: preformatted; lines without an indent are headings.
     """
 
     title: str
@@ -73,7 +74,7 @@ class Exhibit:
     @property
     @cached
     def html(self) -> str:
-        """All of it."""
+        """The whole display."""
         panels = "".join(_panel(each) for each in self.panels)
         parts = [
             f'<div style="margin-bottom:4px"><b>{_words(self.title)}</b> {_words(self.words)}</div>',
@@ -85,12 +86,12 @@ class Exhibit:
 
     @property
     def png(self) -> bytes | None:
-        """The first picture."""
+        """The first picture; None if there is none."""
         return self.panels[0].png if self.panels else None
 
 
 def _words(text: str) -> str:
-    """Words, escaped and with units as people write them."""
+    """Escaped text, with units in their usual notation."""
     return escape(text).replace(" um", " µm")
 
 
@@ -126,7 +127,7 @@ def _row(kind: str, cells: Iterable[str], looks: str = "") -> str:
 
 
 def _text(text: str) -> str:
-    """Text as it is, with lines that stand at the left in bold where others below them are indented."""
+    """Preformatted text; lines at the left are bold if the line below is indented."""
     if len(text) > LONGEST:
         text = f"{text[:LONGEST]}\n… and {len(text) - LONGEST} letters more: print() shows them"
     lines = text.split("\n")

@@ -1,4 +1,4 @@
-"""Pictures for notebooks: no larger than a screen shows and a notebook's file bears."""
+"""Pictures for notebooks, limited to what a screen shows and a notebook file should contain."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from vcc.notebook.html import Panel
 from vcc.plot import style
 
 LARGEST_SIDE = 720
-"""Pixels of a picture; a larger one is averaged down by a whole factor."""
+"""Largest side of a picture, pixels; a larger one is averaged down by an integer factor."""
 MOST_BYTES = 520_000
-"""Of the PNG files of one exhibit, all together."""
+"""Bytes of all PNG files of one display."""
 MAGNIFIED_TO = 320
-"""Pictures smaller than half of this, pixels, are magnified by a whole factor, up to this."""
+"""Pictures smaller than half of this, pixels, are magnified by an integer factor, up to this."""
 GAP = 4
 """Pixels between the pictures of a sheet."""
 COLOURS = 192
-"""Of a drawing."""
+"""Colours of a drawing."""
 DOTS = 160
-"""Dots per inch of drawings, which are shown at `SHOWN_DOTS`: sharp on screens of high density, too."""
+"""Dots per inch of drawings, which are displayed at `SHOWN_DOTS`: sharp on high-density screens, too."""
 SHOWN_DOTS = 80
 
 Array = NDArray[Any]
 
 
 def in_colour(values: Array) -> tuple[NDArray[np.float32], str]:
-    """Values of a picture in 1 or 3 channels, all of them finite, and what was done to get there, in words."""
+    """Finite values in 1 or 3 channels, and a description of the conversion."""
     words = []
     values = np.asarray(values, dtype=np.float32)
     if values.ndim == 3 and values.shape[2] == 1:
@@ -49,12 +49,12 @@ def in_colour(values: Array) -> tuple[NDArray[np.float32], str]:
 
 
 def light_panel(values: Array, words: str = "", share: int = 1) -> Panel:
-    """A picture of light, exposed as `vcc.Image.save` does of itself.
+    """A panel of linear light, with the exposure that `vcc.Image.save` uses.
 
     Args:
         values: linear and upright, shape (rows, columns[, channels]).
-        words: that the caption begins with.
-        share: how many pictures share the room of an exhibit.
+        words: start of the caption.
+        share: number of pictures in the display.
     """
     shown, remark = in_colour(values)
     exposure = auto_exposure(shown)
@@ -63,13 +63,13 @@ def light_panel(values: Array, words: str = "", share: int = 1) -> Panel:
 
 
 def codes_panel(values: Array, code: Callable[[Array], Array], caption: str, share: int = 1) -> Panel:
-    """A picture of any numbers.
+    """A panel of any numbers.
 
     Args:
         values: shape (rows, columns[, channels]).
-        code: makes uint8 of them.
+        code: converts values to uint8.
         caption: below it.
-        share: how many pictures share the room of an exhibit.
+        share: number of pictures in the display.
     """
     first = factor = max(-(-max(values.shape[:2]) // LARGEST_SIDE), 1)
     while True:
@@ -81,12 +81,12 @@ def codes_panel(values: Array, code: Callable[[Array], Array], caption: str, sha
     if factor > 1:
         caption += f"; {factor}×{factor} pixels as one"
     panel = sized(png, codes.shape, caption)
-    # What was averaged to spare bytes is shown as large as it would have been.
+    # If averaging only saved bytes, keep the displayed size.
     return panel if factor == first else replace(panel, width=codes.shape[1] * factor // first)
 
 
 def sized(png: bytes, shape: tuple[int, ...], caption: str) -> Panel:
-    """A panel of a picture of so many rows and columns, magnified where it is small."""
+    """A panel of a picture with these rows and columns, magnified if it is small."""
     times = max(MAGNIFIED_TO // max(shape[:2]), 1)
     return Panel(png, shape[1] * times, caption, pixelated=times > 1)
 
@@ -99,10 +99,10 @@ def encoded(codes: Array) -> bytes:
 
 
 def sheet(pictures: Sequence[Sequence[Array | None]], exposure: float) -> Array:
-    """Pictures of light in rows and columns, RGBA codes; nothing at all between them and where one is missing.
+    """Pictures of light in rows and columns, RGBA codes; transparent in gaps and for missing pictures.
 
     Args:
-        pictures: linear and upright, 1 or 3 channels, of one shape; None for one that is not there.
+        pictures: linear and upright, 1 or 3 channels, of one shape; None for a missing one.
         exposure: the factor before the sRGB curve.
     """
     first = next(each for row in pictures for each in row if each is not None)
@@ -121,12 +121,12 @@ def sheet(pictures: Sequence[Sequence[Array | None]], exposure: float) -> Array:
 
 
 def drawn(draw: Callable[[], Any], caption: str = "", share: int = 2) -> Panel:
-    """A drawing by Matplotlib, which shows itself nowhere else.
+    """A panel of a Matplotlib drawing, which is not displayed elsewhere.
 
     Args:
-        draw: makes axes or a figure, by the functions of `vcc.plot`.
+        draw: returns axes or a figure, by the functions of `vcc.plot`.
         caption: below it.
-        share: how many pictures share the room of an exhibit.
+        share: number of pictures in the display.
     """
     with style.by_itself():
         made = draw()
@@ -137,7 +137,7 @@ def drawn(draw: Callable[[], Any], caption: str = "", share: int = 2) -> Panel:
     for dots in (DOTS, SHOWN_DOTS):
         stream, small = BytesIO(), BytesIO()
         figure.savefig(stream, format="png", dpi=dots, facecolor="white")
-        # A drawing has few colours, and takes half the bytes by numbers of them.
+        # A drawing has few colours, and an indexed PNG takes half the bytes.
         Image.open(stream).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(small, "png")
         png = small.getvalue()
         if len(png) <= MOST_BYTES // share:
@@ -146,11 +146,11 @@ def drawn(draw: Callable[[], Any], caption: str = "", share: int = 2) -> Panel:
 
 
 def map_panel(values: Array, label: str, caption: str = "", *, outliers: bool = True) -> Panel:
-    """Numbers by position in colours, with a scale.
+    """A colour map of numbers by position, with a scale.
 
     Args:
-        values: shape (rows, columns); what is not finite is left white.
-        label: what the numbers are, with their unit.
+        values: shape (rows, columns); values that are not finite stay white.
+        label: of the scale, with the unit.
         caption: below it.
         outliers: whether the scale leaves out the lowest and the highest 1 % of the numbers.
     """

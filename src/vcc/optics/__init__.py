@@ -2,17 +2,21 @@
 
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, SlopeFunction
 from vcc.optics.diffuser import CodedDiffuser, Diffuser
+from vcc.optics.direction import AngleFilter, Louvre
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.first_order import FirstOrder, Pupil
 from vcc.optics.lens import Lens
 from vcc.optics.lens_array import LensArray, PrismArray
 from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
+from vcc.optics.pixels import Microlens
 from vcc.optics.prisms import Biprism, Prism, Pyramid
 from vcc.optics.scatter import Scatter, SheetMap
+from vcc.optics.terms import Term
 from vcc.shapes.lattice import Lattice
 
 __all__ = [
+    "AngleFilter",
     "Biprism",
     "CellDeflection",
     "CodedDiffuser",
@@ -25,7 +29,9 @@ __all__ = [
     "Lattice",
     "Lens",
     "LensArray",
+    "Louvre",
     "Mask",
+    "Microlens",
     "Part",
     "PhasePlate",
     "Prism",
@@ -36,4 +42,5 @@ __all__ = [
     "SheetMap",
     "SlopeFunction",
     "SurfaceDeflection",
+    "Term",
 ]

@@ -12,7 +12,8 @@ standard's)::
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 from vcc.base import checks
@@ -179,6 +180,29 @@ class Electronics(Shown):
     def largest_number(self) -> int:
         """The largest digital number, 2^bits − 1."""
         return int(2**self.bit_depth - 1)
+
+    def binned(self, count: int) -> Electronics:
+        """The electronics of the sum of the numbers of ``count`` photodiodes, each with these electronics.
+
+        Raises:
+            InputError: sums of more than 16 bits.
+        """
+        bits = self.bit_depth + math.ceil(math.log2(count))
+        if bits > 16:
+            raise InputError(
+                f"the sum of {count} photodiodes of {self.bit_depth} bits needs {bits} bits, and 16 are the most: give the "
+                f"electronics a bit_depth of {self.bit_depth - bits + 16} or less"
+            )
+        return replace(
+            self,
+            full_well=self.full_well * count,
+            black_level=self.black_level * count,
+            bit_depth=bits,
+            read_noise=self.read_noise * math.sqrt(count),
+            dark_current=self.dark_current * count,
+            dsnu=self.dsnu * math.sqrt(count),
+            prnu=self.prnu / math.sqrt(count),
+        )
 
     @property
     def saturation(self) -> float:

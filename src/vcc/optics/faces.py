@@ -1,8 +1,8 @@
 """The effect of a thin element in the form that a camera needs: faces, which are functions of position only.
 
 The paper's three categories of optics (section 3.2) are three faces of an element: a linear transform is a
-deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. The effect
-of a thin element may depend on the position of a ray, but not on its slope (louvres are not supported).
+deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection and
+a scatter kernel depend on the place of a ray; a transmission may also depend on the ray's slopes (`Term`).
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
+from vcc.optics.terms import Term
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern, as_pattern
 
@@ -44,6 +45,7 @@ class Faces:
             (x, y) in metres; None transmits all light.
         scatter: distribution of light over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
             position; None scatters nothing.
+        terms: further factors of the transmission, which also depend on the direction of the arriving ray.
 
     Raises:
         InputError: an affine deflection that moves positions or mixes slopes (then the element is not thin),
@@ -53,8 +55,14 @@ class Faces:
     deflection: Affine | Deflection | Callable[[Array, Array], Any] | None = None
     transmission: Pattern | Callable[[Array, Array], ArrayLike] | None = None
     scatter: Scatter | Kernel | None = None
+    terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
+        terms = (self.terms,) if isinstance(self.terms, Term) else tuple(self.terms)
+        for term in terms:
+            if not isinstance(term, Term):
+                raise InputError(f"terms of Faces are vcc.Term objects, not {type(term).__name__}")
+        object.__setattr__(self, "terms", terms)
         if isinstance(self.deflection, Affine):
             _check_thin(self.deflection)
         elif self.deflection is not None:

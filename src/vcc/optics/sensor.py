@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
@@ -14,6 +15,8 @@ from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.electronics import Electronics
+from vcc.optics.pixels import Microlens
+from vcc.shapes.patterns import Pattern, as_pattern
 
 
 @dataclass(frozen=True)
@@ -28,11 +31,16 @@ class Sensor(Shown):
         fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
             pixel's proportions in its middle. A smaller area collects less light, and samples more sharply.
         electronics: conversion of light into numbers, for `vcc.Camera.expose`; None if only irradiance
-            is needed.
+            is needed. For a sensor with photodiodes, that of one photodiode.
+        photodiodes: (rows, columns) in each pixel, under its microlens: (1, 2) for dual pixels, (2, 2) for quad pixels.
+        microlens: over the photodiodes of each pixel; None: one that images the exit pupil of the camera's stop.
+        angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`, in
+            which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are a tile
+            that repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
 
     Raises:
-        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, or a fill
-            factor outside its range.
+        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor outside
+            its range, fewer than one photodiode, or a microlens without photodiodes.
     """
 
     z: float = field(metadata={"unit": "length"})
@@ -41,6 +49,14 @@ class Sensor(Shown):
     decentre: tuple[float, float] = field(default=(0.0, 0.0), metadata={"unit": "length"})
     fill_factor: float = 1.0
     electronics: Electronics | None = None
+    photodiodes: tuple[int, int] = (1, 1)
+    microlens: Microlens | None = None
+    angular_response: (
+        Pattern
+        | Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]
+        | tuple[tuple[Pattern, ...], ...]
+        | None
+    ) = None
 
     def __post_init__(self) -> None:
         checks.finite("the sensor's z", self.z, "metres")
@@ -53,10 +69,21 @@ class Sensor(Shown):
             raise InputError(
                 f"the sensor's electronics are a vcc.Electronics, not a {type(self.electronics).__name__}"
             )
+        self._check_pixels()
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "decentre", middle)
+
+    def _check_pixels(self) -> None:
+        photodiodes = checks.counts("the sensor's photodiodes", self.photodiodes, "rows", "columns")
+        object.__setattr__(self, "photodiodes", photodiodes)
+        if self.microlens is not None and not isinstance(self.microlens, Microlens):
+            raise InputError(f"the sensor's microlens is a vcc.Microlens, not a {type(self.microlens).__name__}")
+        if self.microlens is not None and photodiodes == (1, 1):
+            raise InputError("the sensor has a microlens and one photodiode: give photodiodes, such as (1, 2)")
+        if self.angular_response is not None:
+            object.__setattr__(self, "angular_response", _checked_response(self.angular_response))
 
     def _check_pitch(self) -> None:
         pitches = self.pitch if isinstance(self.pitch, tuple | list) else (self.pitch, self.pitch)
@@ -66,6 +93,14 @@ class Sensor(Shown):
             )
         for pitch in pitches:
             checks.above_zero("the sensor's pitch", pitch, unit="m")
+
+    @property
+    def pixel_kinds(self) -> tuple[tuple[Pattern | None, ...], ...]:
+        """The angular responses of the tile that repeats over the sensor, rows of columns; one of all pixels alike."""
+        response = self.angular_response
+        if isinstance(response, tuple):
+            return response
+        return ((None if response is None else as_pattern(response),),)
 
     @property
     def pitches(self) -> tuple[float, float]:
@@ -115,3 +150,18 @@ class Sensor(Shown):
         """y of the middle of each row of pixels, metres."""
         rows = np.arange(self.shape[0]) - (self.shape[0] - 1) / 2
         return np.asarray(rows * self.pitches[0] + self.decentre[1], dtype=np.float64)
+
+
+def _checked_response(given: object) -> Pattern | tuple[tuple[Pattern, ...], ...]:
+    """An angular response, or a tile of several.
+
+    Raises:
+        InputError: what is no pattern, or rows of a tile that are not equally long.
+    """
+    with checks.within("the sensor's angular_response"):
+        if not isinstance(given, tuple | list):
+            return as_pattern(given)  # type: ignore[arg-type]
+        rows = [row if isinstance(row, tuple | list) else (row,) for row in given]
+        if not rows or len({len(row) for row in rows}) != 1 or not rows[0]:
+            raise InputError("a tile of responses is rows of equally many patterns, such as ((a, b), (c, d))")
+        return tuple(tuple(as_pattern(one) for one in row) for row in rows)

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cmp_to_key
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,14 @@ from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.faces import Element, Faces
+from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
 from vcc.optics.sensor import Sensor
+from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
+
+
+RESPONSE = "response of the pixels"
+"""Name of the sensor's angular response among the stages of a train."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,6 +45,8 @@ class Stage(Brief):
         faces: effect of the stage, in coordinates centred on the element.
         arriving: rays from the entrance plane to just before this stage, with all affine optics on the way folded;
             other bending (lens arrays, phase plates) and scattering are ignored.
+        term: for a factor of the transmission that depends on direction: the stage is in the term's own plane
+            (`Term.to_plane`), ``approach`` leads there, and the next stage's leads back.
     """
 
     element: Element
@@ -46,6 +54,7 @@ class Stage(Brief):
     approach: Affine
     faces: Faces
     arriving: Affine = field(default_factory=Affine.identity)
+    term: Term | None = None
 
     def __post_init__(self) -> None:
         if self.faces.pattern is not None:
@@ -222,17 +231,110 @@ class Train(Value, Shown):
     def _path(self) -> tuple[tuple[Stage, ...], Affine]:
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
-        for element in self.elements:
+        for element in (*self.elements, *self._pixels):
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in element.parts():
                 if isinstance(part, Affine):
                     approach = about(element.decentre, part) @ approach
                     continue
+                for term in part.terms:
+                    to_plane = about(element.decentre, term.to_plane)
+                    approach = to_plane @ approach
+                    faces = Faces(transmission=term.pattern)
+                    stages.append(Stage(element, here, approach, faces, approach @ leaving, term))
+                    approach, leaving = to_plane.inverse(), stages[-1].leaving
+                if part.terms:
+                    part = replace(part, terms=())
+                    if part.deflection is None and part.transmission is None and part.scatter is None:
+                        continue
                 stages.append(Stage(element, here, approach, part, approach @ leaving))
                 approach, leaving = Affine.identity(), stages[-1].leaving
             here += element.length
         return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
+
+    @property
+    def _pixels(self) -> tuple[Element, ...]:
+        """The response of pixels to slopes, as an element at the sensor, where all pixels respond alike."""
+        response = self.sensor.angular_response
+        if response is None or isinstance(response, tuple):
+            return ()
+        return (PixelTransmission(z=self.sensor.z, name=RESPONSE, terms=(Term.of_slopes(response),)),)
+
+    def photodiode(self, row: int, column: int) -> Self:
+        """The same with one of the sensor's photodiodes in place of the whole pixels.
+
+        Args:
+            row: 0 for the top one (smaller y).
+            column: 0 for the left one (smaller x), which records light from the right half of the exit pupil.
+
+        Raises:
+            InputError: no such photodiode, no stop whose exit pupil the microlenses are shifted for, or a microlens
+                without the height that its photodiodes need.
+        """
+        sensor = self.sensor
+        rows, columns = sensor.photodiodes
+        if not (0 <= row < rows and 0 <= column < columns):
+            raise InputError(
+                f"there is no photodiode ({row}, {column}): the sensor has {rows}×{columns} (rows, columns) in a pixel"
+            )
+        microlens = sensor.microlens or Microlens()
+        term = photodiode_term(sensor.photodiodes, (row, column), sensor.pitches, microlens, self.chief_rays())
+        named = f"photodiode ({row}, {column})"
+        pixels = PixelTransmission(z=sensor.z, name=named, terms=(term,))
+        plain = replace(sensor, photodiodes=(1, 1), microlens=None)
+        return type(self)((*self.elements, pixels), plain, name=self.name)
+
+    def pixel_kind(self, row: int, column: int) -> Self:
+        """The same with all pixels like one of the tile that `Sensor.angular_response` repeats over the sensor.
+
+        Args:
+            row: of the tile.
+            column: likewise.
+
+        Raises:
+            InputError: no such pixel of the tile.
+        """
+        kinds = self.sensor.pixel_kinds
+        if not (0 <= row < len(kinds) and 0 <= column < len(kinds[0])):
+            raise InputError(
+                f"there is no pixel ({row}, {column}) in a tile of {len(kinds)}×{len(kinds[0])} angular responses"
+            )
+        sensor = replace(self.sensor, angular_response=kinds[row][column])
+        return type(self)(self.elements, sensor, name=self.name)
+
+    def chief_rays(self) -> SlopesOfChief:
+        """The rays from the middle of the exit pupil: that of the sensor's microlens, or of the camera's stop.
+
+        The stop is the opening of known size that lets the smallest range of slopes through to a place on the sensor.
+
+        Raises:
+            InputError: neither is known.
+        """
+        given = None if self.sensor.microlens is None else self.sensor.microlens.pupil_distance
+        if given is not None:
+            return SlopesOfChief.from_distance(given)
+        from_sensor = self.arriving_at_sensor.inverse()
+        best: tuple[float, SlopesOfChief] | None = None
+        for stage in reversed(self.stages):
+            if stage.faces.bending is not None:
+                break  # what lies before it is not imaged as a whole
+            if stage.faces.pattern is None or stage.term is not None:
+                continue
+            stop_from_sensor = stage.leaving @ from_sensor
+            by_slope = stop_from_sensor.linear[:2, 2:]
+            half = min(stage.faces.pattern.size) / 2
+            if math.isfinite(half) and abs(np.linalg.det(by_slope)) > 1e-12 * max(np.abs(by_slope).max(), 1e-12) ** 2:
+                bound = half / float(np.linalg.norm(by_slope, 2))
+                if best is None or bound < best[0]:
+                    middle = stage.element.decentre
+                    best = bound, SlopesOfChief.from_stop(stop_from_sensor, middle, stage.element.label)
+        if best is None:
+            raise InputError(
+                "photodiodes need an exit pupil, and no stop of known size lies before the sensor (behind plates and "
+                "arrays): give the lens a diameter, or Sensor(microlens=vcc.Microlens(pupil_distance=…))"
+            )
+        return best[1]
 
     def listed(self) -> list[str]:
         """The elements in order and the sensor, a line each: place, kind, name and parameters."""
@@ -243,7 +345,10 @@ class Train(Value, Shown):
         rows, columns = self.sensor.shape
         vertical, horizontal = self.sensor.pitches
         pitch = short(vertical) if vertical == horizontal else f"{short(vertical)} × {short(horizontal)}"
-        return [*lines, f"{_place(self.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}"]
+        within = "×".join(map(str, self.sensor.photodiodes))
+        parts = "" if within == "1×1" else f", {within} photodiodes each"
+        response = "" if self.sensor.angular_response is None else ", with an angular response"
+        return [*lines, f"{_place(self.sensor.z)}sensor, {rows}×{columns} pixels of {pitch}{parts}{response}"]
 
     def __repr__(self) -> str:
         count = len(self.elements)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vcc.base import checks
 from vcc.base.units import mm
-from vcc.optics import CellDeflection, Element, Faces
+from vcc.optics import CellDeflection, Element, Faces, Louvre
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plot import style
@@ -21,6 +21,8 @@ from vcc.plot.tracing import Paths, fan, trace
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+UNBOUNDED_SLOPE = 0.3
+"""Slope up to which light is drawn that meets an element which filters directions without a bound."""
 UNBOUNDED = 10 * mm
 """Half the height of what is drawn of an element without a rim."""
 CELLS = 5
@@ -32,6 +34,8 @@ ROOM_BEHIND = (1.5, 60.0)
 
 def plot_element(element: Element, *, across: str = "x", axes: Axes | None = None) -> Axes:
     """Draw an element from the side, and parallel light that goes through it to the right.
+
+    Elements that filter directions are drawn with light of three directions.
 
     Of an element without a rim a piece 20 mm high is drawn, of an array of cells the five in its middle. Rays are
     followed for about as far as the element brings them to a point or apart; z counts from the element.
@@ -51,7 +55,9 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     axis = "xy".index(across)
     element = replace(element, z=0.0, decentre=(0.0, 0.0))
     half, rays = _part(element, axis)
-    paths = _traced(element, fan(np.linspace(-0.97 * half, 0.97 * half, rays), math.inf, 0.0, axis), half, axis)
+    places = np.linspace(-0.97 * half, 0.97 * half, rays)
+    bundle = np.concatenate([fan(places, math.inf, slope, axis) for slope in _slopes(element, axis)])
+    paths = _traced(element, bundle, half, axis)
     end = float(paths.z[-1])
     before = 0.4 * (end - element.length)
     axes = style.new_axes(5.0, 2.9) if axes is None else axes
@@ -61,7 +67,10 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     axes.set_ylim(*((-highest, highest) if axis == 0 else (highest, -highest)))
     pen = Pen(axis, -half, half, 0.03 * (end + before), axes)
     draw_optical_axis(axes)
-    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z))  # parallel: heights are the same there
+    positions = paths.positions.copy()  # light arrives along straight lines, however far before it is drawn from
+    arriving = (positions[:, 1] - positions[:, 0]) / (paths.z[1] - paths.z[0])
+    positions[:, 0] = positions[:, 1] - arriving * before
+    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z), positions=positions)
     draw_paths(axes, math.inf, paths, axis, style.BLUE)
     draw_element(pen, element, half)
     style.tidy(axes, "z from the element [mm]", f"{across} [mm]")
@@ -71,12 +80,24 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
 def _part(element: Element, axis: int) -> tuple[float, int]:
     """Half the height of what is drawn, metres, and how many rays."""
     half = half_size(element, axis)
+    if isinstance(element, Louvre):
+        return 2.4 * element.pitch, 4 * RAYS_A_CELL
     faces = [part for part in element.parts() if isinstance(part, Faces)]
     cells = next((part.bending for part in faces if isinstance(part.bending, CellDeflection)), None)
     if cells is not None:
         return min(half, CELLS * cells.lattice.pitch / 2), RAYS_A_CELL * CELLS
     scatters = any(part.spread is not None for part in faces)
     return half if math.isfinite(half) else UNBOUNDED, RAYS_THAT_SPLIT if scatters else RAYS
+
+
+def _slopes(element: Element, axis: int) -> tuple[float, ...]:
+    """Slopes of the light that is drawn: 0, and of an element that filters directions, two that pass less or not."""
+    terms = [term for part in element.parts() if isinstance(part, Faces) for term in part.terms]
+    if not terms:
+        return (0.0,)
+    steepest = min(term.steepest[axis] for term in terms)
+    most = steepest if math.isfinite(steepest) else UNBOUNDED_SLOPE
+    return (0.0, 0.55 * most, -1.1 * most)
 
 
 def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Paths:

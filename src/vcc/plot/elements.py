@@ -21,6 +21,7 @@ from vcc.optics import (
     Faces,
     FirstOrder,
     Lens,
+    Louvre,
     Prism,
     Scatter,
 )
@@ -39,6 +40,8 @@ MOST_CELLS = 60
 CELLS_INSTEAD = 40
 """About so many."""
 POINTS = 801
+MOST_WALLS = 60
+"""Walls of a louvre that are drawn; more are a dotted sheet."""
 """At which the profile of a piece of glass is looked at."""
 
 
@@ -129,6 +132,8 @@ def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
         _draw_lens(pen, element)
     elif isinstance(element, Prism):
         _draw_prism(pen, element)
+    elif isinstance(element, Louvre):
+        _draw_louvre(pen, element)
     else:
         _draw_by_faces(pen, element, planes[0].faces)
 
@@ -219,7 +224,7 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
         _draw_frosted(pen, element, faces.spread, half)
     if faces.pattern is None:
         if not (bends or scatters):
-            _draw_sheet(pen, element)
+            _draw_sheet(pen, element, by_direction=bool(faces.terms))
         return
     if not (bends or scatters):
         _draw_mask(pen, element, faces.pattern)
@@ -381,11 +386,31 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
     pen.fill(*outline, linestyle="-" if bounded else (0, (4, 2)), **looks)
 
 
-def _draw_sheet(pen: Pen, element: Element) -> None:
-    """What has neither a known shape nor a transmission: a thin sheet."""
+def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
+    """What has neither a known shape nor a transmission by position: a thin sheet, dotted if it filters directions."""
     middle = (pen.low + pen.high) / 2
     ends = middle + 1.02 * pen.half * np.array([-1, 1])
-    pen.line([element.z, element.z], ends, color=style.GLASS_EDGE, linewidth=2, zorder=1)
+    looks: dict[str, Any] = {"dashes": (1, 1)} if by_direction else {}
+    pen.line([element.z, element.z], ends, color=style.GLASS_EDGE, linewidth=2, zorder=1, **looks)
+
+
+def _draw_louvre(pen: Pen, louvre: Louvre) -> None:
+    """Its walls, where the drawing's plane cuts them; a dotted sheet if it runs along them or they are too many."""
+    across = math.cos(louvre.rotation) if pen.axis == 0 else math.sin(louvre.rotation)
+    pitch = louvre.pitch / max(abs(across), 1e-9)
+    if 2 * pen.half / pitch > MOST_WALLS:
+        _draw_sheet(pen, louvre, by_direction=True)
+        return
+    centre, thick = louvre.decentre[pen.axis], louvre.wall / max(abs(across), 1e-9)
+    first, last = math.floor((pen.low - centre) / pitch - 0.5), math.ceil((pen.high - centre) / pitch - 0.5)
+    for n in range(first, last + 1):
+        middle = centre + (n + 0.5) * pitch
+        if not pen.low <= middle <= pen.high:
+            continue
+        z = louvre.z + np.array([0.0, louvre.height, louvre.height, 0.0])
+        pen.fill(
+            z, middle + thick / 2 * np.array([-1, -1, 1, 1]), facecolor="black", edgecolor="black", linewidth=0.8, zorder=2
+        )
 
 
 def mask_bar(

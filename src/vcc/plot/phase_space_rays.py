@@ -229,6 +229,9 @@ class _Bundle:
         if stage.faces.pattern is not None:
             share = stage.faces.pattern(x, y)
             self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
+        for term in stage.faces.terms:
+            share = term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
+            self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
         self.rays = stage.deflected(self.rays)
         if stage.faces.spread is not None:
             self._scatter(stage, stage.faces.spread, count)

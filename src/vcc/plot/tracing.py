@@ -138,6 +138,8 @@ class _Bundle:
         x, y = (self.rays[:, :2] - stage.element.decentre).T
         if stage.faces.pattern is not None:
             self.share = self.share * stage.faces.pattern(x, y)
+        for term in stage.faces.terms:
+            self.share = self.share * term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
         self.rays = stage.deflected(self.rays)
         if stage.faces.spread is not None and split_along is not None:
             with stage.named():

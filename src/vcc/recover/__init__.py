@@ -1,5 +1,7 @@
-"""From recordings and light fields back to pictures: refocusing, views between views, focal
-stacks, deblurring, decoding of plenoptic and mask-modulated recordings, depth.
+"""Reconstruct images, views and depth from recordings and light fields.
+
+Refocusing, view interpolation, focal stacks, deblurring, decoding of plenoptic and mask-modulated recordings,
+depth.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
 """Blur by known point-spread functions: the forward model of deblurring, and its adjoint.
 
-A recording y is taken as y = K x + noise: every place of the picture x spreads over the pixels as its
-point-spread function (PSF). Where depth, and so the PSF, differs over the picture, masks say which part of it is
-in which layer, and K x = Σ_l k_l ∗ (m_l · x). That conserves light; it leaves out that near things hide what is
-behind.
+A recording is y = K x + noise: each point of the image x is spread over the pixels by its point-spread function
+(PSF). If depth, and so the PSF, varies over the image, masks assign its parts to layers, and
+K x = Σ_l k_l ∗ (m_l · x). This model conserves light; it ignores occlusion.
 
 PSFs are arrays of floating-point numbers that sum to 1, rows before columns, in the orientation of the recording.
-Light of a point stays at the pixel that element (rows // 2, columns // 2) stands for; the others say where it
-strays to.
+Element (rows // 2, columns // 2) is the share of light that stays at its pixel; the other elements are the shares
+that move to the neighbouring pixels.
 """
 
 from __future__ import annotations
@@ -28,19 +27,19 @@ Array = NDArray[np.float64]
 Borders = Literal["unknown", "periodic"]
 
 SUM_TOLERANCE = 1e-6
-"""How far from 1 a PSF, or the masks of a pixel, may sum to."""
+"""Largest deviation from 1 of the sum of a PSF, or of the masks of a pixel."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Blur(Brief):
-    """K and its adjoint by FFT, on a domain that holds all that can reach the recording.
+    """K and its adjoint by FFT, on a domain that contains all light that can reach the recording.
 
-    With periodic borders the domain is the recording itself. With unknown ones it is larger by the PSF, and only
-    the recording's part of K x is seen: light from beyond the borders is looked for, not assumed away.
+    With periodic borders, the domain is the recording itself. With unknown borders, it is larger by the PSF,
+    and only the recording's part of K x is observed: light from outside is estimated, not ignored.
 
     Args:
         psfs: of the layers, (layers, rows, columns).
-        masks: of the layers over the domain, (layers, rows, columns), or None for one layer.
+        masks: of the layers over the domain, (layers, rows, columns), or None for a single layer.
         shape: (rows, columns) of the recording.
         domain: (rows, columns).
         start: (row, column) of the domain where the recording begins.
@@ -70,10 +69,10 @@ class Blur(Brief):
             masks: see `blurred`.
             shape: (rows, columns) of the recording.
             borders: see `blurred`.
-            several: whether there are several PSFs though there are no masks.
+            several: whether there are several PSFs without masks.
 
         Raises:
-            InputError: what `blurred` refuses.
+            InputError: as for `blurred`.
         """
         from scipy import fft
 
@@ -96,7 +95,7 @@ class Blur(Brief):
         return blur
 
     def extended(self, picture: Array, how: Literal["edge", "wrap"]) -> Array:
-        """A picture (rows, columns) on the whole domain: its edges go on, or blend into the opposite ones."""
+        """An image (rows, columns) on the whole domain; its edges are repeated, or blended with opposite ones."""
         after = [whole - n - s for whole, n, s in zip(self.domain, self.shape, self.start, strict=True)]
         if how == "edge":
             return np.pad(picture, [(s, a) for s, a in zip(self.start, after, strict=True)], mode="edge")
@@ -116,7 +115,7 @@ class Blur(Brief):
         return whole[top : top + rows, left : left + columns]
 
     def unseen(self, part: Array) -> Array:
-        """The adjoint of `seen`: zeros around."""
+        """The adjoint of `seen`: zeros outside the recording."""
         whole = np.zeros(self.domain)
         self.seen(whole)[...] = part
         return whole
@@ -126,14 +125,14 @@ class Blur(Brief):
         return self.seen(self.convolved(whole))
 
     def convolved(self, whole: Array) -> Array:
-        """K x on all of the domain."""
+        """K x on the whole domain."""
         from scipy import fft
 
         layers = whole[None] if self.masks is None else self.masks * whole
         return np.asarray(fft.irfft2((self.transfer * fft.rfft2(layers)).sum(axis=0), s=self.domain))
 
     def adjoint(self, part: Array) -> Array:
-        """Kᵀ y on the domain, for y as the recording is."""
+        """Kᵀ y on the domain, for y of the recording's shape."""
         from scipy import fft
 
         spectrum = np.conj(self.transfer) * fft.rfft2(self.unseen(part))
@@ -141,15 +140,15 @@ class Blur(Brief):
         return np.asarray(layers.sum(axis=0) if self.masks is None else (self.masks * layers).sum(axis=0))
 
     def check_memory(self, channels: int, copies: int, memory_limit: int | None) -> None:
-        """Refuse work that takes more memory than allowed.
+        """Check the memory that the work needs.
 
         Args:
-            channels: that are deblurred together.
-            copies: of the domain that each takes.
-            memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+            channels: how many are deblurred together.
+            copies: of the domain, per channel.
+            memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
-            InputError: it does.
+            InputError: more memory needed than allowed.
         """
         rows, columns = self.domain
         needed = 8 * rows * columns * (copies * channels + 5 * len(self.psfs))
@@ -160,18 +159,18 @@ class Blur(Brief):
 def blurred(
     picture: ArrayLike, psf: ArrayLike, *, masks: ArrayLike | None = None, borders: Borders = "unknown"
 ) -> Array:
-    """The picture blurred: Σ_l k_l ∗ (m_l · x), the forward model of deblurring.
+    """The blurred image Σ_l k_l ∗ (m_l · x): the forward model of deblurring.
 
     Args:
         picture: (rows, columns[, channels]), any unit.
         psf: (rows, columns); with masks (layers, rows, columns).
-        masks: (layers, rows, columns), the share of each pixel in each layer; None for one layer.
-        borders: "periodic" lets light that leaves on one side enter on the other; "unknown" continues the picture
-            by its edges, since what is beyond is not known.
+        masks: (layers, rows, columns), the share of each pixel in each layer; None for a single layer.
+        borders: "periodic" wraps light around: light that leaves on one side enters on the other; "unknown"
+            repeats the image's edges, since the outside is unknown.
 
     Raises:
-        InputError: a PSF that is larger than the picture, not finite, negative or not of sum 1; masks that do not
-            fit or do not sum to 1; a picture that is not finite.
+        InputError: a PSF that is larger than the image, not finite, negative or not of sum 1; masks of a
+            wrong shape or sum; an image that is not finite.
     """
     values = numbers_of(picture, "the picture")
     blur = Blur.of(psf, masks, values.shape[:2], borders)
@@ -185,7 +184,7 @@ def channels_first(values: Array) -> Array:
 
 
 def channels_last(channels: Array, shape: tuple[int, ...]) -> Array:
-    """(channels, rows, columns) in the shape that they had before `channels_first`."""
+    """(channels, rows, columns) in the shape before `channels_first`."""
     return np.ascontiguousarray(np.moveaxis(channels, 0, 2)).reshape(shape)
 
 

@@ -1,7 +1,7 @@
 """Deblurring with known point-spread functions: Wiener, Richardson–Lucy, and sparse gradients (total variation).
 
-What is undone is the blur of `vcc.recover.blur`, y = K x + noise: every place of the picture x spreads over the
-pixels as its point-spread function (PSF).
+These methods invert the blur of `vcc.recover.blur`, y = K x + noise: each point of the image x is spread over the
+pixels by its point-spread function (PSF).
 """
 
 from __future__ import annotations
@@ -23,34 +23,33 @@ from vcc.recover.recorded import numbers_of
 Array = NDArray[np.float64]
 
 _PRESENT = 1e-9
-"""Without noise, frequencies passed with less than this amplitude are taken as lost: rounding of double precision
-would come back a billion times larger."""
+"""Without noise, frequencies that pass with a smaller amplitude count as lost: they would amplify rounding errors
+of double precision a billion times."""
 _FAINT = 1e-2
-"""Beyond the borders, pixels that send less than this share of their light into the recording are left as they are
+"""Outside the recording, pixels that send less than this share of their light into it are not updated
 (Bertero & Boccacci 2005)."""
 _SMOOTHED = 0.1
-"""Gradients below this share of the typical one count quadratically, so that the prior has a derivative at 0."""
+"""Gradients below this share of the typical gradient count quadratically, which makes the prior smooth at 0."""
 _DIM, _CLASSES, _TRIED, _ROUNDS = 1e-14, 400, 40, 5
-"""Of the search for a prior: the faintest frequency that counts, classes of frequencies, values tried at once, and
-how often a search goes on between the best one's neighbours."""
+"""For the search for a prior: relative power of the faintest class of frequencies, number of classes, values
+tried at once, and rounds of refinement."""
 _MISFIT = 0.05
-"""Of the recording's contrast, how far a layer's PSF is wrong for other layers: only for where a solver starts."""
+"""Error of a layer's PSF at other layers, relative to the recording's contrast; for the initial estimate."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Deblurred(Brief, Shown):
-    """What a solver found, and how it ended.
+    """The result of a deblurring solver, and its status.
 
     Args:
         picture: shape of the recording, float64.
-        converged: whether it stopped because it had arrived (or needs no steps), not because of its limit of
-            steps.
-        iterations: steps taken; 0 for closed forms.
-        change: ‖last step‖ / ‖picture‖.
-        objective: what the solver makes small, after each step: for Richardson–Lucy the Kullback–Leibler
-            divergence of the recording from the blurred picture, for sparse gradients the negative log posterior.
-            Empty for Wiener.
-        message: how it ended, for people.
+        converged: whether the solver stopped by its tolerance (or needs no steps), not at its limit of steps.
+        iterations: number of steps; 0 for closed forms.
+        change: ‖last step‖ / ‖image‖.
+        objective: the minimised function after each step: for Richardson–Lucy the Kullback–Leibler divergence
+            of the recording from the blurred image, for sparse gradients the negative log posterior. Empty
+            for Wiener.
+        message: the status as text.
     """
 
     picture: Array
@@ -69,31 +68,31 @@ def wiener(
     contrast: float | None = None,
     borders: Borders = "unknown",
 ) -> Deblurred:
-    """The linear estimate of least mean squared error, for pictures whose power falls as 1/f².
+    """The linear estimate with the least mean squared error, for images whose power falls as 1/f².
 
-    X = conj(K)·Y / (|K|² + σ²/P) at each frequency f, with the mean power of natural pictures P(f) = c/|f|²
-    (Field, *Relations between the statistics of natural images*, 1987) as prior, as Zhou & Nayar, *What are Good
-    Apertures for Defocus Deblurring?* (2009) have it. P is infinite at f = 0, so the mean brightness stays as it
-    is. Without noise it divides by K wherever K lets anything pass, and leaves lost frequencies at 0.
+    X = conj(K)·Y / (|K|² + σ²/P) at each frequency f. The prior is the mean power of natural images P(f) = c/|f|²
+    (Field, *Relations between the statistics of natural images*, 1987), as in Zhou & Nayar, *What are Good
+    Apertures for Defocus Deblurring?* (2009). P is infinite at f = 0, so the mean brightness does not change.
+    Without noise, the estimate divides by K where K passes anything, and is 0 at lost frequencies.
 
-    Of n PSFs, such as those of n depths that are equally likely, it makes the one filter of least mean squared
-    error over all: X = Σ conj(K)·Y / (Σ |K|² + n·σ²/P). That serves cameras whose PSF hardly changes with depth.
-    Where it does change and depths are known, `sparse_gradients` takes masks; with an exponent of 2 it has this
-    prior.
+    For n PSFs, such as those of n equally likely depths, this returns the estimate of the one filter with the
+    least mean squared error over all of them: X = Σ conj(K)·Y / (Σ |K|² + n·σ²/P). This suits cameras whose
+    PSF hardly changes with depth. If the PSF changes and depths are known, use `sparse_gradients` with masks;
+    an exponent of 2 gives the same prior.
 
     Args:
         recording: (rows, columns[, channels]), any unit.
-        psf: (rows, columns), sum 1; or several of one size, (n, rows, columns), for which there is one filter.
-        noise: standard deviation σ of the recording's noise, in its unit; 0 where there is none.
+        psf: (rows, columns), sum 1; or several of one size, (n, rows, columns), for a common filter.
+        noise: standard deviation σ of the recording's noise, in its unit; 0 without noise.
         contrast: √c, in the recording's unit × cycles per pixel, where P is the mean squared amplitude of a
-            unitary Fourier transform; None takes that by which the recording's spectrum is likeliest, and not
-            more than its variance allows, channel by channel; with unknown borders, what they blend counts as
-            further noise.
-        borders: "periodic" is exact for pictures that go on periodically. "unknown" lets the recording's opposite
-            edges blend into each other beyond its borders; up to a PSF from them the result is less sure.
+            unitary Fourier transform; None estimates it by maximum likelihood from the recording's spectrum,
+            limited by its variance, for each channel. With unknown borders, blended borders count as
+            additional noise.
+        borders: "periodic" is exact for periodic images. "unknown" blends opposite edges of the recording outside
+            its borders; within the size of the PSF from the borders the result is less certain.
 
     Raises:
-        InputError: a negative noise, a contrast of zero or less, or what `blurred` refuses.
+        InputError: a negative noise, a contrast that is not positive, or an error of `blurred`.
     """
     from scipy import fft
 
@@ -106,7 +105,7 @@ def wiener(
     blur = Blur.of(psf, None, (rows, columns), borders, several=np.ndim(psf) == 3)
     down, right = np.meshgrid(fft.fftfreq(blur.domain[0]), fft.rfftfreq(blur.domain[1]), indexing="ij")
     squared = down**2 + right**2
-    # Frequencies that the half spectrum leaves out are the conjugates of those it has.
+    # Frequencies missing in the half spectrum are conjugates of those in it.
     twice = np.where((right > 0) & (right < 0.5), 2.0, 1.0)
     transfer = blur.transfer.mean(axis=0)
     power = (np.abs(blur.transfer) ** 2).mean(axis=0)
@@ -117,7 +116,7 @@ def wiener(
         spectrum = fft.rfft2(blur.extended(channel, "wrap"))
         strength, variance = 1.0 if contrast is None else contrast**2, noise**2
         if contrast is None and noise > 0:
-            # Beyond the borders there is no noise, but what blends there is no picture behind this blur either.
+            # Outside the borders there is no noise, but the blended values do not follow the blur model either.
             share = rows * columns / samples
             shown = np.abs(spectrum) ** 2 / samples
             strength, variance = _likeliest(shown, power, squared, twice, share * noise**2, share < 1)
@@ -131,22 +130,22 @@ def wiener(
 def _likeliest(
     shown: Array, power: Array, squared: Array, count: Array, noise: float, more: bool
 ) -> tuple[float, float]:
-    """The c and the noise of greatest likelihood: |Y|² is exponentially distributed, of mean |K|²·c/f² + σ².
+    """The most likely c and noise: |Y|² is exponentially distributed with mean |K|²·c/f² + σ².
 
     Args:
         shown: |Y|² of a unitary transform.
         power: |K|².
         squared: f², cycles per pixel.
-        count: how many frequencies each stands for.
-        noise: σ² as it is in ``shown``, above 0.
-        more: whether there may be more noise than that.
+        count: how many frequencies each value represents.
+        noise: σ² in the scale of ``shown``, above 0.
+        more: whether the noise may be larger than that.
 
     Returns:
-        c, and σ² as it is in ``shown``.
+        c, and σ² in the scale of ``shown``.
     """
     known = squared > 0
     passed = power[known] / squared[known]
-    # Frequencies of one |K|²/f² have one mean: they count by their sum.
+    # Frequencies with the same |K|²/f² have the same mean: only their sum matters.
     brightest = float(passed.max())
     place = np.log(np.maximum(passed / brightest, _DIM)) / math.log(_DIM) * (_CLASSES - 1)
     index = np.rint(place).astype(np.intp)
@@ -154,8 +153,9 @@ def _likeliest(
     total = np.bincount(index, count[known] * shown[known], _CLASSES)
     level = brightest * _DIM ** (np.arange(_CLASSES) / (_CLASSES - 1))
     whole = max(float(total.sum()), 1e-300)
-    # Between a picture that noise hides everywhere and one that has all that is seen: what this blur cannot have
-    # made, such as things at another depth, would ask for more at high frequencies than all that there is.
+    # From an image hidden by noise at all frequencies to one with all observed power. Details that do not
+    # follow this blur, such as objects at another depth, would require more power at high frequencies than
+    # was observed.
     lowest = 1e-3 * noise / brightest
     low_c, high_c = math.log(lowest), math.log(max(whole / float((number * level).sum()), 2 * lowest))
     low_v = math.log(noise)
@@ -181,28 +181,28 @@ def richardson_lucy(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Deblurred:
-    """Richardson–Lucy: towards the picture of greatest likelihood under photon noise, none of it negative.
+    """Richardson–Lucy: iterates towards the non-negative image of maximum likelihood under photon noise.
 
-    x ← x/(Kᵀ1) · Kᵀ(y / K x), of Richardson, *Bayesian-Based Iterative Method of Image Restoration* (1972), and
-    Lucy (1974); the expectation maximisation of Poisson counts (Shepp & Vardi 1982). Light is conserved: with
-    periodic borders the picture's sum is the recording's after each step. What lies beyond unknown borders is
-    estimated with the rest (Bertero & Boccacci, *A simple method for the reduction of boundary effects in the
-    Richardson-Lucy approach to image deconvolution*, 2005). There is no prior: with noise, stopping early is what
-    regularises.
+    x ← x/(Kᵀ1) · Kᵀ(y / K x) (Richardson, *Bayesian-Based Iterative Method of Image Restoration*, 1972, and Lucy,
+    1974); expectation maximisation for Poisson counts (Shepp & Vardi 1982). Light is conserved: with periodic
+    borders the image's sum equals the recording's after each step. The image outside unknown borders is
+    estimated as well (Bertero & Boccacci, *A simple method for the reduction of boundary effects in the
+    Richardson-Lucy approach to image deconvolution*, 2005). There is no prior: stop early to regularise noisy
+    recordings.
 
     Args:
-        recording: (rows, columns[, channels]), light, none negative.
+        recording: (rows, columns[, channels]), light, not negative.
         psf: (rows, columns), sum 1; with masks (layers, rows, columns).
         masks: (layers, rows, columns), the share of each pixel in each layer.
-        iterations: at most.
-        tolerance: stop once a step changes the picture by no more than this share, ‖Δx‖ ≤ tolerance·‖x‖.
+        iterations: the largest number of steps.
+        tolerance: stop after a step with ‖Δx‖ ≤ tolerance·‖x‖.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:
-        InputError: a negative recording, no iterations, a negative tolerance, more memory needed than allowed, or
-            what `blurred` refuses.
+        InputError: a negative recording, less than 1 iteration, a negative tolerance, more memory needed than
+            allowed, or an error of `blurred`.
     """
     values = numbers_of(recording, "the recording")
     if values.min() < 0:
@@ -236,8 +236,8 @@ def richardson_lucy(
 
 
 def _lucy_step(blur: Blur, held: Array, channel: Array, estimate: Array) -> Array:
-    """How an estimate on the domain changes; ``held`` is Kᵀ1, what of each pixel's light is seen."""
-    # Rounding of the FFT leaves tiny negative numbers where a picture is black.
+    """The step of an estimate on the domain; ``held`` is Kᵀ1, the observed share of each pixel's light."""
+    # Rounding of the FFT leaves tiny negative numbers where an image is black.
     floor = 1e-12 * max(float(channel.max()), 1e-300)
     ratio = blur.adjoint(channel / np.maximum(blur.apply(estimate), floor))
     factor = np.divide(ratio, held, out=np.ones_like(ratio), where=held > _FAINT)
@@ -263,31 +263,31 @@ def sparse_gradients(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Deblurred:
-    """The most probable picture whose gradients are mostly small and sometimes large: total variation, or sparser.
+    """The most probable image whose gradients are mostly small and rarely large: total variation, or sparser.
 
-    Minimises ‖K x − y‖²/(2σ²) + Σ (|∇x|/b)^p over pictures that are nowhere negative. p = 1 is total variation
-    (Rudin, Osher & Fatemi, *Nonlinear total variation based noise removal algorithms*, 1992); p = 0.8 is what
-    natural pictures show, and leaves local minima (Levin et al. 2007). |∇x| takes the forward differences down and
-    right, and all channels together, so that edges stay in one place. The minimum is sought by L-BFGS-B of
-    `scipy.optimize`, from the Wiener estimate.
+    Minimises ‖K x − y‖²/(2σ²) + Σ (|∇x|/b)^p over non-negative images. p = 1 is total variation (Rudin, Osher &
+    Fatemi, *Nonlinear total variation based noise removal algorithms*, 1992); p = 0.8 matches natural images, but
+    has local minima (Levin et al. 2007). |∇x| combines the forward differences down and right of all channels, so
+    that edges coincide in all channels. The solver is L-BFGS-B of `scipy.optimize`, starting from the Wiener
+    estimate.
 
     Args:
         recording: (rows, columns[, channels]), any unit.
         psf: (rows, columns), sum 1; with masks (layers, rows, columns).
         noise: standard deviation σ of the recording's noise, in its unit, above 0.
         masks: (layers, rows, columns), the share of each pixel in each layer.
-        exponent: p, above 0 and up to 2 (2 is a quadratic prior).
-        gradient_scale: b, in the recording's unit per pixel. None takes the most likely one for the Wiener
-            estimate: the prior's normalisation goes as b^(−N) for N samples, hence b^p = p·Σ|∇x|^p/N.
-        iterations: at most.
-        tolerance: stop once a step lowers the objective by no more than this share.
+        exponent: p, above 0 and at most 2 (2 is a quadratic prior).
+        gradient_scale: b, in the recording's unit per pixel. None uses the most likely value for the Wiener
+            estimate: the prior's normalisation is proportional to b^(−N) for N samples, hence b^p = p·Σ|∇x|^p/N.
+        iterations: the largest number of steps.
+        tolerance: stop after a step that lowers the objective by at most this share.
         borders: see `blurred`.
-        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (steps done, most steps).
 
     Raises:
-        InputError: a noise of zero or less, an exponent or scale out of range, no iterations, a negative
-            tolerance, more memory needed than allowed, or what `blurred` refuses.
+        InputError: a noise that is not positive, an exponent or scale out of range, less than 1 iteration, a
+            negative tolerance, more memory needed than allowed, or an error of `blurred`.
     """
     from scipy import optimize
 
@@ -299,7 +299,7 @@ def sparse_gradients(
     _check_steps(iterations, tolerance)
     channels = channels_first(values)
     blur = Blur.of(psf, masks, values.shape[:2], borders)
-    # L-BFGS-B keeps 10 pairs of steps and gradients, beside some work of its own and ours.
+    # L-BFGS-B keeps 10 pairs of steps and gradients, and needs further working arrays.
     blur.check_memory(len(channels), 34, memory_limit)
     linear = _linear_estimate(channels, blur, noise, masks, borders)
     start = np.stack([blur.extended(np.maximum(each, 0), "edge") for each in linear])
@@ -338,7 +338,7 @@ def sparse_gradients(
 
 @dataclass(frozen=True, eq=False)
 class _Surprise:
-    """The negative log posterior of `sparse_gradients`, and its slope.
+    """The negative log posterior of `sparse_gradients`, and its gradient.
 
     Args:
         channels: of the recording, (channels, rows, columns).
@@ -355,7 +355,7 @@ class _Surprise:
     scale: float
 
     def __call__(self, flat: Array) -> tuple[float, Array]:
-        """Of pictures on the blur's domain, (channels, rows, columns), all numbers in a row."""
+        """Evaluate for images on the blur's domain, (channels, rows, columns), flattened."""
         whole = flat.reshape(len(self.channels), *self.blur.domain)
         slope = np.empty_like(whole)
         value = 0.0
@@ -372,20 +372,20 @@ class _Surprise:
 
 
 def _likeliest_scale(pictures: Array, exponent: float, noise: float) -> float:
-    """The b of greatest likelihood for pictures (channels, rows, columns)."""
+    """The most likely b for images (channels, rows, columns)."""
     lengths = np.sqrt((_gradient(pictures) ** 2).sum(axis=(0, 1)))
     mean = exponent * float((lengths**exponent).sum()) / pictures.size
-    return max(float(mean ** (1 / exponent)), 1e-3 * noise)  # a picture without gradients has no scale
+    return max(float(mean ** (1 / exponent)), 1e-3 * noise)  # for an image without gradients
 
 
 def _linear_estimate(
     channels: Array, blur: Blur, noise: float, masks: ArrayLike | None, borders: Borders
 ) -> Array:
-    """The Wiener estimate, (channels, rows, columns), to start from; with masks that of each layer."""
+    """The Wiener estimate, (channels, rows, columns), as initial value; with masks combined from all layers."""
     picture = np.moveaxis(channels, 0, 2)
     if masks is None:
         return np.moveaxis(wiener(picture, blur.psfs[0], noise, borders=borders).picture, 2, 0)
-    # What is in other layers does not fit a layer's PSF: that is an error beside the noise.
+    # The other layers do not fit a layer's PSF: count that as noise.
     misfit = math.hypot(noise, _MISFIT * float(channels.std()))
     found = np.zeros_like(channels)
     for each, share in zip(blur.psfs, np.asarray(masks, dtype=np.float64), strict=True):

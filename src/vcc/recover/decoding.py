@@ -1,8 +1,8 @@
-"""How the recordings of a camera become a light field, found out from the camera as it stands.
+"""Decode a camera's recordings to light fields, with the method that fits the camera.
 
-Two kinds of optics before a sensor fold views into one picture such that they can be told apart again: a sheet of
-lenslets (`vcc.recover.decode_plenoptic`) and a mask of cosines (`vcc.recover.decode_heterodyne`). Which of them a
-camera has, how many views its recordings hold, and why they hold none, is said here.
+Two kinds of optics before a sensor multiplex views into one image from which they can be recovered: lenslets
+(`vcc.recover.decode_plenoptic`) and a mask of cosines (`vcc.recover.decode_heterodyne`). This module determines
+which kind a camera has, how many views its recordings contain, or why they contain none.
 """
 
 from __future__ import annotations
@@ -34,19 +34,19 @@ from vcc.recover.plenoptic import decode_plenoptic
 Way = Literal["lenslets", "cosines"]
 
 FEWEST: Final = 3
-"""Views along each axis, below which nothing is decoded."""
+"""The smallest number of views along each axis."""
 BORDER: Final = 0.05
-"""Share of the sensor that recordings through a mask fade out over along each edge, and that is cut off."""
+"""Width of the fade-out along each edge of recordings through a mask, as a share of the sensor; it is cropped."""
 MOST_OF_NEIGHBOURS: Final = 0.25
-"""Of a pixel: how much of it a neighbouring micro-image may cover."""
+"""The largest share of a pixel that a neighbouring micro-image may cover."""
 MOST_WASHED_OUT: Final = 0.5
-"""Of a micro-image: the patch of it that a point of the lens may light."""
+"""The largest share of a micro-image that light from one point of the lens may cover."""
 _WHITE = 4
-"""Pixels a side of the views of something white."""
+"""Pixels per side of the views of a white scene."""
 
 
 def way_of(camera: Train) -> Way:
-    """What folds views into the recordings of a camera; whether they can be told apart, `Decoder.of` says.
+    """How a camera multiplexes views in its recordings; `Decoder.of` checks whether they can be separated.
 
     Raises:
         InputError: neither lenslets nor a mask of cosines.
@@ -63,12 +63,12 @@ def way_of(camera: Train) -> Way:
 
 @dataclass(frozen=True)
 class Decoder:
-    """How the recordings of one camera become light fields.
+    """Decodes the recordings of one camera to light fields.
 
     Args:
-        camera: that records.
-        way: by which it folds views into a picture.
-        views: (rows, columns) of those that come out of it.
+        camera: the camera.
+        way: how it multiplexes views.
+        views: (rows, columns) of the decoded views.
     """
 
     camera: Camera
@@ -77,21 +77,21 @@ class Decoder:
 
     @classmethod
     def of(cls, camera: Camera, grid: Grid | None = None) -> Decoder:
-        """That of a camera.
+        """The decoder for a camera.
 
-        Through lenslets as many views are told apart as there are pixels, each way, in the picture that a lenslet
-        makes of the narrowest opening before it, without those on which light of its neighbours falls too; through
-        a mask of cosines, one for each tile.
+        With lenslets, the number of views along an axis is the number of pixels in a lenslet's image of the
+        narrowest opening, without pixels that also receive light of neighbouring lenslets. With a mask of
+        cosines, it is the number of tiles.
 
         Args:
-            camera: as it stands.
-            grid: of the light field before it, whose views bound the light where no opening does.
+            camera: the camera.
+            grid: of the light field before it; its views limit the light if no opening does.
 
         Raises:
             InputError: neither lenslets nor a mask of cosines; lenslets behind optics that are not affine, with
-                something behind them, on the sensor, so far from it that micro-images overlap or are washed out,
-                or so near, or with so coarse pixels, that they hold fewer than `FEWEST` views; a mask that
-                `vcc.recover.HeterodyneGeometry.of` refuses.
+                elements behind them, on the sensor, so far from it that micro-images overlap or are blurred, or so
+                near, or with so coarse pixels, that there are fewer than `FEWEST` views; a mask that
+                `vcc.recover.HeterodyneGeometry.of` does not support.
         """
         way = way_of(camera)
         if way == "lenslets":
@@ -106,14 +106,14 @@ class Decoder:
         return cls(camera, way, (geometry.views, geometry.views))
 
     def calibration(self, light_field: LightField, progress: Progress | None = None) -> Image:
-        """What decoding divides by: simulated recordings of something white, through a pinhole for a mask.
+        """The calibration for decoding: simulated recordings of a white scene, for a mask through a pinhole.
 
         Args:
-            light_field: before the camera, of which the views' places count, and for a mask their pixels too.
+            light_field: before the camera; the positions of its views are used, for a mask also its pixels.
             progress: called with (done, total).
 
         Raises:
-            InputError: views that do not stand in rows along the axes, for a mask.
+            InputError: for a mask, views that are not in rows along the axes.
         """
         if self.way == "cosines":
             return heterodyne_calibration(self.camera, light_field=light_field, progress=progress)
@@ -126,14 +126,14 @@ class Decoder:
 
         Args:
             recording: by the camera.
-            calibration: `calibration` of it.
+            calibration: the result of `calibration`.
             progress: called with (done, total).
 
         Warns:
-            ResultWarning: views that are dark, as those in the corners of a round opening are.
+            ResultWarning: some views are dark, as those in the corners of a round opening.
 
         Raises:
-            InputError: what `vcc.recover.decode_plenoptic` and `vcc.recover.decode_heterodyne` refuse.
+            InputError: as for `vcc.recover.decode_plenoptic` and `vcc.recover.decode_heterodyne`.
         """
         if self.way == "cosines":
             return decode_heterodyne(
@@ -150,9 +150,9 @@ class Decoder:
 
 
 def _white(grid: Grid) -> LightField:
-    """Radiance 1 from where a light field comes from and around it, by few samples: (rows, columns, 4, 4).
+    """Radiance 1 from the scene of a light field and around it, with few samples: (rows, columns, 4, 4).
 
-    Views are twice as wide: between the middles of the outermost samples, where all is 1, the whole of them lies.
+    Views are twice as wide: the original views lie between the centres of the outermost samples.
     """
     nv, nu, nt, ns = grid.shape[:4]
     middle = Affine.translation(0, 0, (ns - 1) / 2, (nt - 1) / 2)
@@ -166,7 +166,7 @@ def _white(grid: Grid) -> LightField:
 
 
 def _views_of_lenslets(camera: Camera, grid: Grid | None) -> tuple[int, int]:
-    """How many views, (rows, columns), are told apart in each micro-image."""
+    """The number of views, (rows, columns), that can be separated in each micro-image."""
     optics = LensletOptics.of(camera)
     _check_affine(camera, optics.array)
     _check_sharp(optics)
@@ -174,7 +174,8 @@ def _views_of_lenslets(camera: Camera, grid: Grid | None) -> tuple[int, int]:
     counts = []
     for axis, (apart, pixel) in enumerate(zip(pitches, camera.sensor.pitches[::-1], strict=True)):
         width = min(_widths(camera, optics, grid, axis), default=math.inf) / pixel
-        # A pixel at δ from the middle counts where half of it is lit or more, and a neighbour's light ends before.
+        # A pixel at δ from the centre counts if at least half of it is lit, and light of neighbours ends
+        # before it.
         lit, free = width / 2, apart - width / 2 - 0.5 + MOST_OF_NEIGHBOURS
         if math.isinf(width):
             free = lit
@@ -197,22 +198,23 @@ def _check_affine(camera: Camera, array: LensArray) -> None:
 
 
 def _widths(camera: Camera, optics: LensletOptics, grid: Grid | None, axis: int) -> Iterator[float]:
-    """Of the pictures, on the sensor, that a lenslet makes of each opening before it, metres.
+    """Widths, on the sensor, of a lenslet's images of the openings before it, metres.
 
-    A ray from height h of an opening to the middle of a lenslet has the slope −h/B there, where B is what the
-    optics between make of a slope; behind the lenslet it goes on as it came.
+    A ray from height h of an opening to the centre of a lenslet arrives with slope −h/B; B is the element of
+    the ray matrix that maps slopes at the opening to positions at the lenslets. The lenslet does not deflect
+    the ray.
     """
     at_array = optics.rays_at_array
     before = [stage for stage in camera.stages if stage.element is not optics.array]
     openings = [(stage.faces.pattern.size[axis], stage.leaving) for stage in before if stage.faces.pattern]
     for size, leaving in [(_size_of_views(grid)[axis], Affine.identity()), *openings]:
         by_slope = abs(float((at_array @ leaving.inverse()).matrix[axis, axis + 2]))
-        if math.isfinite(size) and by_slope > 1e-12:  # what stands at the lenslets bounds the field, not views
+        if math.isfinite(size) and by_slope > 1e-12:  # openings at the lenslets limit the field, not views
             yield size * optics.gap / by_slope
 
 
 def _size_of_views(grid: Grid | None) -> tuple[float, float]:
-    """(width, height) at the entrance of the views' cells together, metres; infinite where nothing is known."""
+    """(width, height) of all views at the entrance plane, metres; infinite if unknown."""
     if grid is None:
         return math.inf, math.inf
     rows, columns = grid.shape[:2]
@@ -221,10 +223,10 @@ def _size_of_views(grid: Grid | None) -> tuple[float, float]:
 
 
 def _check_sharp(optics: LensletOptics) -> None:
-    """Refuse lenslets by which a point of the lens lights more than half of a micro-image."""
+    """Check that light from a point of the lens covers at most half of a micro-image."""
     array, gap = optics.array, optics.gap
     power = float(np.mean(1 / np.asarray(array.focal_lengths)))
-    growth = float(optics.sensor_from_array.linear[0, 0])  # 1 + gap times the curvature of what arrives
+    growth = float(optics.sensor_from_array.linear[0, 0])  # 1 + gap × curvature of the arriving wave
     opening = math.sqrt(1.0 if array.fill_factor is None else array.fill_factor)
     if opening * abs(growth - gap * power) <= MOST_WASHED_OUT * abs(growth):
         return
@@ -237,7 +239,7 @@ def _check_sharp(optics: LensletOptics) -> None:
 
 
 def _too_few(camera: Camera, optics: LensletOptics, width: float, apart: float) -> str:
-    """Why micro-images hold no views, and what to do, for widths and distances in pixels."""
+    """The message for micro-images without views, with a remedy; widths and distances in pixels."""
     array, gap = optics.array, optics.gap
     seen = f"{array.label} makes micro-images {apart:.3g} pixels apart"
     if apart / 2 - 0.5 < 1 - 1e-6:

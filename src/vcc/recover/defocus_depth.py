@@ -1,8 +1,8 @@
-"""Depth from one picture through a coded aperture: the scale of the blur tells the distance (Levin et al. 2007).
+"""Depth from one image through a coded aperture, from the scale of its blur (Levin et al. 2007).
 
-Out of focus, each point becomes a picture of the aperture, the larger the farther it is from the focal plane. An
-aperture with a code leaves zeros in the spectrum at places that depend on that scale, so that only the kernel of
-the right distance explains a block of the picture.
+An out-of-focus point becomes an image of the aperture, larger with increasing distance from the focal plane. With
+a coded aperture, the spectrum has zeros at frequencies that depend on this scale, so that only the kernel of the
+correct distance explains a block of the image.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from vcc.recover.recorded import numbers_of
 Array = NDArray[np.float64]
 
 MANY_AT_ENDS = 0.1
-"""The share of blocks from which on it is said that they take an outermost candidate."""
-_VIEWS_PER_PIXEL = 4  # of a kernel's width
+"""The share of blocks at an outermost candidate from which on a warning is given."""
+_VIEWS_PER_PIXEL = 4  # views per pixel of a kernel's width
 _FEWEST_VIEWS = 64
-_SAMPLE = 0.02  # of a pixel: the least size of the point that kernels are made of
-_RATIOS = np.geomspace(0.01, 4, 6)  # of noise to the contrast of a pixel's gradient, that a block is tried with
-_EXPONENTS = (2, 3)  # of 1/f, in power: textures of all scales have 2, a few straight edges 3 (Field 1987)
-_SECTORS, _RINGS = 4, 4  # of a spectrum: its parts, which misfits of the model are taken to hit one by one
-_FINER = 4  # frequencies between those of a block, where expected spectra are computed
-_SMALLEST_CHANGE = 0.01  # pixels by which the radii of neighbouring kernels must differ
+_SAMPLE = 0.02  # pixels: smallest size of the point for kernels
+_RATIOS = np.geomspace(0.01, 4, 6)  # noise / gradient contrast, candidates for a block
+_EXPONENTS = (2, 3)  # n of power 1/fⁿ: 2 for natural textures, 3 for a few straight edges (Field 1987)
+_SECTORS, _RINGS = 4, 4  # parts of a spectrum; model errors count as independent between them
+_FINER = 4  # oversampling of expected spectra
+_SMALLEST_CHANGE = 0.01  # pixels: smallest difference between radii of neighbouring kernels
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DefocusDepth(Brief, Shown):
-    """The distances of the blocks of a picture.
+    """The distances of the blocks of an image.
 
     Args:
         distance: metres before the entrance plane, one of the candidates, shape (block rows, block columns).
-        index: which candidate that is, likewise.
-        confidence: 0 (all candidates explain the block alike, as where there is no texture) to 1, likewise: the
-            probability of the candidate found, less that of a guess.
-        log_likelihood: of each candidate, less that of the best, nats, shape (candidates, block rows, block
+        index: of the candidate, same shape.
+        confidence: same shape, 0 (all candidates explain the block equally well, for instance without texture) to
+            1: the probability of the chosen candidate, minus that of a guess, rescaled to 0 to 1.
+        log_likelihood: of each candidate, minus that of the best, nats, shape (candidates, block rows, block
             columns).
-        rows: the row of each block's middle in the picture, pixels, shape (block rows,).
-        columns: likewise the column, shape (block columns,).
+        rows: the row of each block's centre in the image, pixels, shape (block rows,).
+        columns: the column, shape (block columns,).
         block: side of a block, pixels.
         distances: of all candidates, metres.
     """
@@ -69,27 +69,27 @@ class DefocusDepth(Brief, Shown):
     distances: tuple[float, ...] = ()
 
     def smoothed(self, cost: float = 1.0, outliers: float = 0.02, sweeps: int = 100) -> DefocusDepth:
-        """The distances that fit the blocks and their neighbours best, as Levin et al. smooth theirs.
+        """The distances that fit the blocks and their neighbours best, smoothed as in Levin et al.
 
-        A Markov random field over the blocks: along a border as long as half a block, neighbours whose candidates
-        lie n apart cost cost·n nats, and no more than log(candidates): things end, and then anything may come.
-        Blocks overlap and tell much the same: each counts by the share of its window (its middle half each way)
-        that is its own, so that the step from block to block does not matter. No block outvotes all others: some
-        are wrong however sure, and then have any candidate, so that what the likelihood holds against one counts
-        up to log(candidates / outliers). The least energy is sought by min-sum belief propagation (Felzenszwalb
-        and Huttenlocher, *Efficient belief propagation for early vision*, 2006).
+        The model is a Markov random field over the blocks. Along a border as long as half a block, neighbours
+        whose candidates are n apart cost cost·n nats, limited to log(candidates) because objects have edges.
+        Blocks overlap and are correlated: each counts by the share of its window (the middle half along each
+        axis) that no other block shares, so that the result does not depend on the step between blocks. A
+        block can be wrong although its likelihood is certain. Therefore the cost of a candidate is limited to
+        log(candidates / outliers). The energy is minimised by min-sum belief propagation (Felzenszwalb and
+        Huttenlocher, *Efficient belief propagation for early vision*, 2006).
 
         Args:
-            cost: of one step between neighbouring candidates, nats; with 1 it is e times less probable.
-            outliers: the share of blocks that are wrong though sure; of pictures of occluding discs and boards
-                about one in fifty.
-            sweeps: of messages, at least twice as many as there are blocks from side to side.
+            cost: of a step between neighbouring candidates, nats; 1 makes it e times less probable.
+            outliers: the share of blocks that are wrong although certain; about one in fifty for images of
+                occluding discs and boards.
+            sweeps: of messages, at least twice the number of blocks along the longer side.
 
         Returns:
-            The same blocks, with the distances, confidences and likelihoods that know the neighbours.
+            The same blocks, with distances, confidences and likelihoods that include their neighbours.
 
         Raises:
-            InputError: a cost of zero or less, a share of outliers that is not between 0 and 1, or no sweeps.
+            InputError: a cost that is not positive, outliers not between 0 and 1, or fewer than 1 sweep.
         """
         if not (cost > 0 and 0 < outliers < 1 and sweeps >= 1):
             raise InputError(
@@ -98,7 +98,7 @@ class DefocusDepth(Brief, Shown):
             )
         count = len(self.log_likelihood)
         step = float(np.diff(self.rows).min() if len(self.rows) > 1 else self.block / 2)
-        own = min(2 * step / self.block, 1.0)  # each way
+        own = min(2 * step / self.block, 1.0)  # along each axis
         against = own**2 * np.minimum(-self.log_likelihood, math.log(count / outliers))
         apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
         belief = _beliefs(against, own * np.minimum(cost * apart, math.log(count)), sweeps)
@@ -106,20 +106,21 @@ class DefocusDepth(Brief, Shown):
 
 
 def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: float | None = None) -> list[Array]:
-    """What a camera makes of points on the axis at several distances: captured by the camera itself.
+    """The images of points on the axis at several distances, captured with the camera itself.
 
     Args:
-        camera: its optics affine, so that the kernel is that of the whole picture (a mask near the sensor is not).
+        camera: with affine optics, so that the kernel is the same over the whole image (not so with a mask
+            near the sensor).
         distances: of the points before the entrance plane, metres, all on one side of the focal plane.
-        aperture: side of the square in the entrance plane through which light comes, metres; None takes the
-            smallest opening that stands in the entrance plane.
+        aperture: side of the square in the entrance plane through which light enters, metres; None uses the
+            smallest opening in the entrance plane.
 
     Returns:
-        A kernel for each distance, of one odd size, of sum 1, as light lands on the sensor.
+        One kernel per distance, all of one odd size, each of sum 1, inverted as on the sensor.
 
     Raises:
-        InputError: distances on both sides of the focal plane or of zero or less, no opening in the entrance
-            plane, optics that are not affine, or no light through them.
+        InputError: distances on both sides of the focal plane or not positive, no opening in the entrance plane,
+            optics that are not affine, or no light on the sensor.
     """
     away = [float(distance) for distance in distances]
     if not away or not all(distance > 0 for distance in away):
@@ -127,7 +128,7 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     aperture = _opening(camera) if aperture is None else aperture
     checks.above_zero("aperture", aperture, unit="m")
     ray = camera.rays_at(camera.sensor.z).linear
-    # A point at Z sends u, s = u/Z: it lands at u·(A + B/Z).
+    # A point at Z sends u, s = u/Z; the ray arrives at u·(A + B/Z).
     spread = {distance: ray[0, 0] + ray[0, 2] / distance for distance in away}
     if min(spread.values()) < 0 < max(spread.values()):
         raise InputError(_crosses(min(away), max(away), -ray[0, 2] / ray[0, 0]))
@@ -138,8 +139,8 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     views = max(_FEWEST_VIEWS, math.ceil(_VIEWS_PER_PIXEL * widest))
     kernels = []
     for distance in away:
-        # The point is as large as its pictures by neighbouring views lie apart: they join without gaps. Smaller
-        # ones would step from pixel to pixel as the distance changes, all at once where they lie in rows.
+        # The point is as large as the spacing of its images by neighbouring views, so that they join without gaps.
+        # Smaller points would jump from pixel to pixel as the distance changes, for whole rows of views at once.
         size_of_point = max(aperture * abs(spread[distance]) / views, _SAMPLE * pitch)
         point = LightField.from_views(
             np.ones((views, views, 1, 1), np.float32),
@@ -153,11 +154,11 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
 
 
 def _kernel(camera: Camera, point: LightField, distance: float) -> Array:
-    """The picture of a point by a camera, divided by its light."""
+    """The image of a point, divided by its sum."""
     with warnings.catch_warnings():
-        # Around a point there is nothing: that its light field does not fill the sensor is as it should be.
+        # A single point does not fill the sensor: no warning is needed.
         warnings.simplefilter("ignore", ResultWarning)
-        # Linear: the picture of one point stays without ringing, and nowhere below 0.
+        # Linear interpolation does not ring, and is not negative.
         picture = camera.capture(point, method="footprints", interpolation="linear", between_views="none")
     values = to_numpy(picture.values)
     total = float(values.sum(dtype=np.float64))
@@ -176,47 +177,48 @@ def depth_from_defocus(
     step: int | None = None,
     memory_limit: int | None = None,
 ) -> DefocusDepth:
-    """Which of several kernels blurred each block of a picture, hence how far away it is.
+    """Estimate the distance of each block of an image, by the kernel that explains its blur best.
 
-    With kernel F and a Gaussian prior P(ω) = a²/|∇(ω)|², the sharp picture x that explains a recording y best has
+    With kernel F and a Gaussian prior P(ω) = a²/|∇(ω)|², the sharp image x that explains a recording y best has
     the energy ‖y − F∗x‖²/σ² + ‖∇x‖²/a² = Σ |Y|²/S, S = |F|²P + σ² (Levin et al. 2007, section 3). A wrong kernel
-    has its zeros where the recording has light, and the energy is high. Levin et al. weigh the energies of
-    different kernels by factors learned from pictures; here the likelihood has them, −½·Σ(|Y|²/S + log S) (Whittle
-    1953), taken over each block under a Hann window, with S as that window sees it. The strength of the texture a,
-    its exponent (of |∇|: 2, or 3 for straight edges) and the noise σ (no less than is stated, as other things than
-    noise are unexplained too) are those most likely for the block. Channels are turned into as many components
-    whose gradients are uncorrelated over the picture, each with a texture of its own.
+    has its zeros at frequencies where the recording has power, which gives a high energy. Levin et al. weight the
+    energies of different kernels by factors learned from images. Here the likelihood −½·Σ(|Y|²/S + log S) (Whittle
+    1953) weights them. It is computed for each block under a Hann window, with S as seen through the window.
+    The texture strength a, its exponent (of |∇|: 2, or 3 for straight edges) and the noise σ (at least the
+    given noise, since other effects than noise are unexplained too) are the most likely ones for the block.
+    Channels are transformed to components with uncorrelated gradients, each with its own texture.
 
-    Pictures are not Gaussian: a single strong edge may favour one wrong kernel by hundreds of nats, all from a few
-    frequencies. How far a difference D of log-likelihoods is to be trusted, the parts d of the spectrum tell (4
-    directions, 4 rings, each component): with V = Σ d², as White's sandwich (1982) has it, it counts as 2·D²/V
-    nats where that is less. Under the model V is 2·D, and D counts as it is.
+    Images are not Gaussian: a single strong edge can favour a wrong kernel by hundreds of nats, from a few
+    frequencies only. The reliability of a difference D of log-likelihoods follows from its parts d in the
+    spectrum (4 directions, 4 rings, each component): with V = Σ d², as in the sandwich estimator of White
+    (1982), D is limited to 2·D²/V nats. If the model holds, V is 2·D, and D is unchanged.
 
-    The likelihood knows the kernels by |F| alone, which is the same on both sides of the focal plane (the kernel
-    is turned by 180°), whatever the code: candidates must lie on one side.
+    The likelihood depends on |F| only. A kernel on the other side of the focal plane is rotated by 180° and
+    has the same |F| for any code. Therefore all candidates must be on one side.
 
     Args:
-        image: the recording, as light lands on the sensor, (rows, columns[, channels]).
-        kernels: for each candidate its point spread, as light lands on the sensor, of sum 1: `defocus_kernels`.
+        image: the recording, inverted as on the sensor, (rows, columns[, channels]).
+        kernels: the point-spread function of each candidate, inverted as on the sensor, of sum 1:
+            `defocus_kernels`.
         distances: of the candidates, metres.
-        noise: standard deviation of the noise of a pixel, the same in each channel, in the picture's units.
-        block: side of the blocks, pixels, no smaller than the kernels. The window gives weight to its middle half,
-            and tells zeros of a spectrum apart that lie 2/block or more from each other: a kernel's lie 1/width
-            apart, so blocks should be twice as wide.
-        step: from block to block, pixels; None takes half a block.
-        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        noise: standard deviation of the noise of a pixel, the same in each channel, in the image's units.
+        block: side of the blocks, pixels, at least the size of the kernels. The window mostly weights its
+            middle half and resolves zeros of a spectrum that are at least 2/block apart. The zeros of a
+            kernel are 1/width apart, so blocks should be twice as wide as kernels.
+        step: from block to block, pixels; None uses half a block.
+        memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
-        The distances of blocks side by side from the upper left corner on.
+        The distances of the blocks, starting at the upper left corner.
 
     Raises:
-        InputError: candidates that are not two or more, that cross the focal plane or cannot be told apart, a
-            kernel larger than the picture or a block or not of sum 1, a picture with NaNs or too small for one
-            block, a noise of zero or less, more memory needed than allowed.
+        InputError: fewer than two candidates, candidates on both sides of the focal plane or with equal kernels, a
+            kernel larger than the image or a block or not of sum 1, an image with NaNs or too small for one block,
+            a noise that is not positive, more memory needed than allowed.
 
     Warns:
-        ResultWarning: a tenth of the blocks or more, by their confidence, take the nearest or the farthest
-            candidate: they may lie beyond.
+        ResultWarning: at least a tenth of the blocks, weighted by confidence, is at the nearest or the farthest
+            candidate: they may be beyond it.
     """
     numbers = numbers_of(image, "the picture")
     values = numbers.reshape(*numbers.shape[:2], -1)
@@ -254,7 +256,7 @@ def depth_from_defocus(
 
 
 def _warn_of_ends(found: Array, confidence: Array, distances: tuple[float, ...]) -> None:
-    """Say how many blocks take an outermost candidate, beyond which nothing was tried."""
+    """Warn if many blocks are at an outermost candidate."""
     weight = float(confidence.sum())
     ends = (min(distances), max(distances))
     shares = [float(confidence[found == end].sum()) / weight if weight else 0.0 for end in ends]
@@ -289,7 +291,7 @@ def _block_starts(shape: tuple[int, ...], kernels: list[Array], block: int, step
 
 
 def _decided(log_likelihood: Array, distances: Sequence[float]) -> dict[str, Any]:
-    """What the likelihoods (candidates, rows, columns) come to, as `DefocusDepth` has it."""
+    """The fields of `DefocusDepth` that follow from the likelihoods (candidates, rows, columns)."""
     relative = log_likelihood - log_likelihood.max(axis=0)
     index = relative.argmax(axis=0)
     guess = 1 / len(relative)
@@ -299,12 +301,12 @@ def _decided(log_likelihood: Array, distances: Sequence[float]) -> dict[str, Any
 
 
 def _beliefs(against: Array, steps: Array, sweeps: int) -> Array:
-    """Costs (candidates, rows, columns) with what neighbours on the grid add, by min-sum messages.
+    """Costs (candidates, rows, columns) that include the neighbours, by min-sum messages.
 
     Args:
-        against: what each block holds against each candidate.
+        against: cost of each candidate, for each block.
         steps: cost of a pair of neighbouring candidates, (candidates, candidates).
-        sweeps: how often messages go round.
+        sweeps: how often all messages are updated.
     """
 
     def onward(held: Array) -> Array:
@@ -314,8 +316,8 @@ def _beliefs(against: Array, steps: Array, sweeps: int) -> Array:
     down, up, right, left = messages = np.zeros((4, *against.shape))
     for _ in range(sweeps):
         belief = against + messages.sum(axis=0)
-        # What a neighbour has said is left out of what it is told. All speak at once: halfway from what was said
-        # before, lest neighbours take turns for ever.
+        # A message excludes what its receiver sent. All are updated at once, by half of the change: full
+        # updates could oscillate for ever.
         sent = [onward((belief - up)[:, :-1]), onward((belief - down)[:, 1:])]
         sent += [onward((belief - left)[:, :, :-1]), onward((belief - right)[:, :, 1:])]
         heard = (down[:, 1:], up[:, :-1], right[:, :, 1:], left[:, :, :-1])
@@ -378,7 +380,7 @@ def _check_candidates(kernels: list[Array], distances: Sequence[float], shape: t
 
 
 def _radius(kernel: Array) -> float:
-    """Root mean square distance from the middle of the light, pixels."""
+    """Root mean square distance of the light from its centroid, pixels."""
     y, x = np.indices(kernel.shape)
     my, mx = (kernel * y).sum(), (kernel * x).sum()
     return math.sqrt(max((kernel * ((y - my) ** 2 + (x - mx) ** 2)).sum(), 0))
@@ -395,14 +397,14 @@ def _spectra(values: Array, starts: list[Any], window: Array) -> Array:
 
 
 def _components(values: Array) -> Array:
-    """The channels turned so that their gradients are uncorrelated, (channels, rows, columns); noise stays."""
+    """The channels, rotated to uncorrelated gradients, (channels, rows, columns); the noise stays the same."""
     channels = values.shape[2]
     gradients = np.concatenate([np.diff(values, axis=axis).reshape(-1, channels) for axis in (0, 1)])
     return np.asarray(np.moveaxis(values @ np.linalg.eigh(gradients.T @ gradients)[1], 2, 0))
 
 
 def _expected(kernel: Array, window: Array, exponent: float) -> Array:
-    """The power spectrum that texture of strength 1 has, on average, under the kernel and the window."""
+    """The expected power spectrum of a texture of strength 1 under the kernel and the window."""
     from scipy.fft import irfft2, rfft2
 
     size = len(window)
@@ -410,32 +412,32 @@ def _expected(kernel: Array, window: Array, exponent: float) -> Array:
     wy = 2 * np.pi * np.fft.fftfreq(fine[0])[:, None]
     wx = 2 * np.pi * np.fft.rfftfreq(fine[1])
     gradient = 4 * np.sin(wy / 2) ** 2 + 4 * np.sin(wx / 2) ** 2
-    gradient[0, 0] = np.inf  # the mean brightness says nothing
+    gradient[0, 0] = np.inf  # ignore the mean brightness
     covariance = irfft2(np.abs(rfft2(kernel, fine)) ** 2 / gradient ** (exponent / 2), fine)
-    # A product with the window is, for the covariance, one with the window's own correlation.
+    # Multiplying by the window multiplies the covariance by the window's autocorrelation.
     seen = irfft2(np.abs(rfft2(window, fine)) ** 2, fine) / (window**2).sum()
     power = rfft2(covariance * seen).real[::_FINER, ::_FINER]
     return np.asarray(np.maximum(power, 0))
 
 
 def _log_likelihoods(spectra: Array, expected: Sequence[Sequence[Array]], window: Array, noise: float) -> Array:
-    """Of each block, for the most likely texture and noise; up to a constant, nats.
+    """Log-likelihoods of blocks for the most likely texture and noise, up to a constant, nats.
 
     Args:
         spectra: of blocks, (block rows, block columns, b, b // 2 + 1).
-        expected: for each candidate the power spectra of several textures.
+        expected: power spectra of several textures, for each candidate.
         window: (b, b).
         noise: standard deviation.
 
     Returns:
-        What each part of the spectrum says, (candidates, block rows, block columns, parts).
+        The contribution of each part of the spectrum, (candidates, block rows, block columns, parts).
     """
     size = len(window)
-    weight = np.full(spectra.shape[2:], 2.0)  # rfft holds one half of the spectrum
+    weight = np.full(spectra.shape[2:], 2.0)  # rfft stores one half of the spectrum
     weight[:, 0] = 1
     if size % 2 == 0:
         weight[:, -1] = 1
-    # What the window spreads from the mean is not texture.
+    # The lowest frequencies contain the mean, spread by the window, and no texture.
     weight[np.ix_([0, 1, 2, -1, -2], [0, 1, 2])] = 0
     wy, wx = np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None]
     sector = np.floor(np.arctan2(wy, wx) / np.pi * _SECTORS + 0.5).astype(int) % _SECTORS
@@ -450,11 +452,12 @@ def _log_likelihoods(spectra: Array, expected: Sequence[Sequence[Array]], window
             for ratio in _RATIOS:
                 variance = texture.ravel() + ratio**2
                 energy = flat @ (weights / variance).T
-                # The scale a² that fits the block best, unless its noise σ = ratio·a would be less than is known.
+                # The scale a² that fits the block best, limited so that its noise σ = ratio·a is at least the
+                # given noise.
                 scale = np.maximum(energy.sum(axis=1) / counts.sum(), (noise / ratio) ** 2)[:, None]
                 each = -0.5 * (energy / scale + counts * np.log(scale) + weights @ np.log(variance))
                 better = each.sum(axis=1) > best
                 best[better], found[candidate, better] = each.sum(axis=1)[better], each[better]
-    # Bins under a window tell much the same as their neighbours: only as many as its energy spans are new.
+    # Neighbouring bins under a window are correlated: this is the share of independent ones.
     new = (window**2).sum() ** 2 / (window**4).sum() / window.size
     return np.asarray(new * found).reshape(len(expected), *spectra.shape[:2], len(part))

@@ -1,15 +1,15 @@
-"""Depth from the parallax of a light field: how far away what the pixels of its middle view show is.
+"""Depth of the middle view from the parallax of a light field.
 
-Two ways that err differently:
+Two methods with different errors:
 
-- `depth_by_structure_tensor` reads the slope of the lines on epipolar slices, where one row of a picture is
-  stacked over the views: fast, smooth, fine below the pixel; wrong where a line is cut by something nearer.
-- `depth_by_plane_sweep` tries disparities one after the other and asks how well the views then agree with the
-  middle one: slower, sharp at borders, and sound beside things that hide what lies behind them.
+- `depth_by_structure_tensor` measures the slope of lines on epipolar slices, which stack one image row over all
+  views. It is fast, smooth and accurate to fractions of a pixel, but fails at occlusions.
+- `depth_by_plane_sweep` tests a range of disparities and compares the views with the middle one. It is slower, but
+  sharp at object borders and robust to occlusions.
 
-Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than where the views
-converge. Both give the distance in metres through the frame of the light field. Where the search ended at the
-nearest or farthest disparity that it tried, the distance is NaN; beyond infinity it is infinite.
+Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than the plane on which
+the views converge. Both methods compute the distance in metres with the frame of the light field. The distance is
+NaN if the search ended at the lowest or highest disparity; it is infinite beyond infinity.
 """
 
 from __future__ import annotations
@@ -45,30 +45,28 @@ __all__ = [
 Array = NDArray[np.float32]
 
 MANY_ENDED = 0.01
-"""The share of the pixels from which on it is said that the search ended, or that they lie beyond infinity."""
+"""The share of pixels without a result (search ended, or beyond infinity) from which on a warning is given."""
 _SPREAD = 0.3
-"""Standard deviation of disparities around a pixel, pixels per view, that leaves 1/e of its confidence."""
+"""Standard deviation of the disparities around a pixel, pixels per view, that reduces its confidence to 1/e."""
 _AT_AN_END = 0.01
-"""Pixels per view: what is no farther from the end of a search is at it. Between steps nothing comes as near."""
+"""Pixels per view: a disparity this close to the end of a search counts as ended."""
 _BEYOND = 0.1
-"""Pixels per view beyond infinity from which on it is no noise of what is far away."""
-_FARTHEST_TILT = 0.75  # pixels per view from the nearest whole shear: beyond, the next shear sees it better
+"""Pixels per view: a disparity farther than this beyond infinity is not explained by noise."""
+_FARTHEST_TILT = 0.75  # pixels per view from the nearest integer shear; the next shear covers larger tilts
 _SMOOTHING = (3 / 16, 10 / 16, 3 / 16)
 _ALIASED = np.float32(1e3)  # larger than the energy of any derivative
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DepthMap(Brief, Shown):
-    """Where what each pixel of one view shows is.
+    """The depth of each pixel of one view.
 
     Args:
-        disparity: pixels per view along u, positive = nearer than where the views converge, shape (t, s).
-        distance: metres before the plane where the light field is given, shape (t, s): NaN where the search ended
-            at the nearest or farthest disparity that it tried; infinite at the disparity of infinity and on that
-            side of it on which fewer pixels lie; negative where rays meet behind that plane (light that a lens has
-            gathered).
-        confidence: 0 (nothing to hold on to: no texture, views that disagree, or a search that ended) to 1, shape
-            (t, s).
+        disparity: pixels per view along u, positive = nearer than the plane of convergence, shape (t, s).
+        distance: metres before the plane of the light field, shape (t, s): NaN if the search ended at the
+            lowest or highest disparity; infinite at the disparity of infinity and on the side of it with
+            fewer pixels; negative if rays meet behind that plane (light focused by a lens).
+        confidence: 0 (no texture, inconsistent views, or a search that ended) to 1, shape (t, s).
         view: (row, column) of the view.
     """
 
@@ -80,10 +78,10 @@ class DepthMap(Brief, Shown):
 
 @dataclass(frozen=True)
 class DisparityError:
-    """How far disparities are from the truth, in the figures of the HCI benchmark (Honauer et al. 2016).
+    """The error of disparities, by the measures of the HCI benchmark (Honauer et al. 2016).
 
     Args:
-        bad_share: the share of the pixels that are off by more than ``threshold``: BadPix, 0 to 1.
+        bad_share: the share of the pixels with an error above ``threshold``: BadPix, 0 to 1.
         mean_square: MSE × 100, pixels² per view².
         threshold: pixels per view.
         pixels: how many were compared.
@@ -103,17 +101,17 @@ def disparity_error(
     border: int = 15,
     where: NDArray[np.bool_] | None = None,
 ) -> DisparityError:
-    """Compare disparities with the true ones, as the HCI benchmark does.
+    """Compare disparities with the ground truth, as the HCI benchmark does.
 
     Args:
         disparity: pixels per view, shape (t, s).
-        truth: likewise.
-        threshold: pixels per view; the benchmark's are 0.01, 0.03 and 0.07.
-        border: pixels left out on each side; the benchmark leaves out 15.
-        where: the pixels to compare, shape (t, s), for instance those of enough confidence; None takes all.
+        truth: ground truth, same shape.
+        threshold: pixels per view; the benchmark uses 0.01, 0.03 and 0.07.
+        border: pixels to ignore on each side; the benchmark ignores 15.
+        where: the pixels to compare, shape (t, s), for example those of sufficient confidence; None uses all.
 
     Raises:
-        InputError: maps of different shapes, values that are not finite, or nothing left to compare.
+        InputError: maps of different shapes, values that are not finite, or no pixels to compare.
     """
     found, true = np.asarray(disparity, np.float64), np.asarray(truth, np.float64)
     if found.shape != true.shape or found.ndim != 2:
@@ -149,29 +147,29 @@ def depth_by_structure_tensor(
 ) -> DepthMap:
     """Depth from the slope of lines on epipolar slices (Wanner and Goldlücke 2012).
 
-    On a slice (u, s) through the middle row of views, a point at disparity d draws the line k = k₀ − d·i, so that
-    ∂L/∂i = d·∂L/∂k. The structure tensor, products of these derivatives under a Gaussian, gives the slope that
-    fits best (total least squares). The same is done on slices (v, t), and a pixel takes the clearer of the two.
-    Slices are sheared by whole pixels first, one shear after the other over the range of disparities, as slopes
-    beyond a pixel per view are aliased; a pixel takes the shear that leaves its lines most upright and clear.
+    On a slice (u, s) through the middle row of views, a point at disparity d is the line k = k₀ − d·i, so that
+    ∂L/∂i = d·∂L/∂k. The structure tensor, products of these derivatives averaged by a Gaussian, gives the best
+    slope (total least squares). Slices (v, t) are processed in the same way, and each pixel uses the clearer
+    result. Slopes above one pixel per view are aliased. Therefore slices are first sheared by integer shears
+    over the range of disparities, and each pixel uses the shear with the most upright and clear lines.
 
     Args:
-        light_field: 3×1 or 1×3 views at least, its views' axes along those of its pixels.
-        disparity_range: (lowest, highest) disparity along u to be found, pixels per view; None takes it from the
-            data: see `depth_by_plane_sweep`.
-        inner_scale: σ of the Gaussian under which derivatives are taken, pixels and views.
-        outer_scale: σ of the Gaussian over which their products are summed, pixels and views.
-        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        light_field: at least 3×1 or 1×3 views, with view axes along the pixel axes.
+        disparity_range: (lowest, highest) disparity along u, pixels per view; None estimates it: see
+            `depth_by_plane_sweep`.
+        inner_scale: σ of the Gaussian for derivatives, pixels and views.
+        outer_scale: σ of the Gaussian that averages their products, pixels and views.
+        memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
-        Depth of the middle view (row (n − 1) // 2, likewise column), within the range.
+        Depth of the middle view (row (n − 1) // 2, column likewise), within the range.
 
     Raises:
-        InputError: too few views, a frame whose view axes are not along the pixels', a range that is no range or
-            cannot be measured, a scale of zero or less, more memory needed than allowed.
+        InputError: too few views, a frame whose view axes are not along the pixel axes, a range that is invalid or
+            cannot be estimated, a scale that is not positive, more memory needed than allowed.
 
     Warns:
-        ResultWarning: as `depth_by_plane_sweep`.
+        ResultWarning: as for `depth_by_plane_sweep`.
     """
     for name, scale in (("inner_scale", inner_scale), ("outer_scale", outer_scale)):
         above_zero(name, scale)
@@ -180,7 +178,7 @@ def depth_by_structure_tensor(
     low, high = range_of_sweep(light_field, disparity_range, memory_limit)
     cross = arms(light_field)
     samples = max(arm.views.size for arm in cross)
-    # Beside the samples of one arm: its shear, two derivatives, a product and its smoothed copy.
+    # Besides the samples of one arm: its shear, two derivatives, a product and its smoothed copy.
     check_memory(6 * 4 * samples, memory_limit, "depth by the structure tensor", "give a part of the light field")
     disparity, confidence = np.zeros((2, *light_field.shape[2:4]), np.float32)
     for arm in cross:
@@ -199,62 +197,62 @@ def depth_by_plane_sweep(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> DepthMap:
-    """Depth from a sweep of planes: the disparity at which the views agree best with the middle one.
+    """Depth from a plane sweep: the disparity at which the views agree best with the middle one.
 
-    The views of the middle row and column are moved by each disparity in turn (cubic interpolation) and compared
-    with the middle view. What a nearer thing hides from views on one side is seen from the other, so that of the
-    views to the left and to the right, and of those above and below, the half that agrees better counts (Kang,
-    Szeliski and Chai 2001). Costs are gathered over a window that follows the borders in the middle view, a guided
-    filter (Hosni et al. 2013), and along paths on which a disparity that jumps costs more than one that stays
-    (semi-global matching, Hirschmüller 2008). A parabola through the lowest one and its neighbours gives the
-    disparity between steps, and a mean over the same surface around evens it out.
+    The views of the middle row and column are shifted by each disparity (cubic interpolation) and compared
+    with the middle view. An object that occludes a point in the views on one side does not occlude it on the
+    other. Therefore only the better half counts, of the views to the left and right, and of those above and
+    below (Kang, Szeliski and Chai 2001). Costs are aggregated by a guided filter, whose window follows
+    borders in the middle view (Hosni et al. 2013), and along paths that penalise jumps of disparity
+    (semi-global matching, Hirschmüller 2008). A parabola through the lowest cost and its neighbours gives
+    sub-step disparities, and a mean over the surrounding surface smooths them.
 
     Args:
-        light_field: two views at least, its views' axes along those of its pixels.
-        disparity_range: (lowest, highest) disparity along u to be tried, pixels per view; None takes it from the
-            data: `vcc.LightField.measured_disparity_range`, and the range that a sweep of coarser views finds,
-            up to infinity and as far again on the near side, and farther as long as more pixels agree there. A
-            range that the light field states is used as it is. Either is widened by 0.3 pixels at both ends, but
-            not beyond infinity.
-        step: between the disparities tried, pixels per view.
+        light_field: at least two views, with view axes along the pixel axes.
+        disparity_range: (lowest, highest) disparity along u, pixels per view; None estimates it from
+            `vcc.LightField.measured_disparity_range` and a sweep of coarser views. That sweep extends to infinity,
+            as far on the near side, and farther while more pixels match there. A range stored in the light
+            field is used as it is. Each of these is widened by 0.3 pixels at both ends, but not beyond
+            infinity.
+        step: between disparities, pixels per view.
         window: side of the window, pixels, an odd number.
-        memory_limit: bytes that the costs and the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
-        progress: called with (done, total) as the sweep advances.
+        memory_limit: bytes for costs and work; None uses `vcc.base.memory.MEMORY_LIMIT`.
+        progress: called with (done, total) during the sweep.
 
     Returns:
-        Depth of the middle view (row (n − 1) // 2, likewise column), within the range.
+        Depth of the middle view (row (n − 1) // 2, column likewise), within the range.
 
     Raises:
-        InputError: too few views, a frame whose view axes are not along the pixels', a range that is no range or
-            cannot be measured, a step or window that cannot be, more memory needed than allowed.
+        InputError: too few views, a frame whose view axes are not along the pixel axes, a range that is invalid or
+            cannot be estimated, an invalid step or window, more memory needed than allowed.
 
     Warns:
-        ResultWarning: for 1 % of the pixels or more the search ended at an end of the range, or they lie beyond
+        ResultWarning: the search ended at an end of the range for at least 1 % of the pixels, or they are beyond
             infinity.
     """
     above_zero("step", step)
     check_axes(light_field.grid, fewest=2)
     ends = range_of_sweep(light_field, disparity_range, memory_limit)
     found = plane_sweep(light_field, ends, step=step, window=window, memory_limit=memory_limit, progress=progress)
-    # Beside borders, and where each pixel finds another one, disparities are less sure than costs say.
+    # Costs overestimate the confidence at object borders, and where neighbouring pixels differ in disparity.
     disparity = found.disparity.astype(np.float64)
     spread = np.sqrt(np.maximum(around(disparity**2) - around(disparity) ** 2, 0))
     return _depth(light_field.grid, found.disparity, found.confidence * np.exp(-spread / _SPREAD), ends)
 
 
-# --- where the search ended ---
+# --- end of the search ---
 
 
 def _depth(grid: Grid, disparity: Array, confidence: Array, ends: tuple[float, float]) -> DepthMap:
-    """What was found of the middle view; where the search ended, nothing was."""
+    """The depth map of the middle view; without distance and confidence where the search ended."""
     infinity = grid.disparity_of(math.inf)
-    searched = ends[1] - ends[0] > 2 * _AT_AN_END  # else the range says where all is
+    searched = ends[1] - ends[0] > 2 * _AT_AN_END  # otherwise the range is a single disparity
     ended = [
         (np.abs(disparity - end) <= _AT_AN_END) & searched & (abs(end - infinity) > _AT_AN_END) for end in ends
     ]
     lost = ended[0] | ended[1]
     confidence = np.where(lost, np.float32(0), confidence)
-    # The side of infinity on which most of what was found lies.
+    # The side of infinity with most of the pixels.
     before = disparity > infinity
     weights = confidence if confidence.any() else np.ones_like(confidence)
     side = 1 if weights[before].sum() >= weights[~before].sum() else -1
@@ -267,7 +265,7 @@ def _depth(grid: Grid, disparity: Array, confidence: Array, ends: tuple[float, f
 
 
 def _warn(grid: Grid, ends: tuple[float, float], ended: list[float], beyond: float) -> None:
-    """Say for how many pixels there is no result."""
+    """Warn if many pixels have no result."""
     said = []
     if sum(ended) >= MANY_ENDED:
         where = " and ".join(
@@ -299,7 +297,7 @@ def _best_shear(
     disparity, clarity, left = np.full((3, *arm.views.shape[2:4]), np.inf, np.float32)
     for shear in range(math.floor(ends[0] + 0.5), math.ceil(ends[1] - 0.5) + 1):
         tilt, coherence, unexplained = _orientation(_tensor(arm, grid, shear, inner, outer))
-        # What moves too far for this shear is aliased in it, however clear it looks.
+        # Points that move too far in this shear are aliased, however clear they look.
         aliased = np.abs(tilt) > _FARTHEST_TILT
         unexplained = np.where(aliased, _ALIASED + unexplained, unexplained)
         better = unexplained < left
@@ -310,24 +308,25 @@ def _best_shear(
 
 
 def _sheared(arm: Arm, shear: float) -> Array:
-    """Views moved so that what has the disparity ``shear`` stands still; borders repeated."""
+    """Views shifted so that points of disparity ``shear`` do not move; borders are repeated."""
     if shear == 0:
         return arm.views
-    # What is at k in the middle view is at k − d·i in the view i steps on.
+    # A point at k in the middle view is at k − d·i in view i.
     return np.stack([moved(view, -shear * (n - arm.middle), arm.axis) for n, view in enumerate(arm.views)])
 
 
 def _tensor(arm: Arm, grid: Grid, shear: float, inner: float, outer: float) -> Array:
-    """The structure tensor (J_ii, J_kk, J_ik) at the middle view, sheared, k in steps of disparity along u."""
+    """The structure tensor (J_ii, J_kk, J_ik) of a sheared arm at the middle view; k in disparity along u."""
     from scipy.ndimage import correlate1d, gaussian_filter1d
 
     axis = arm.axis + 1
     own, beyond = grid.disparities_along(arm.along, (shear, shear + 1e-3))
-    per_u = np.float32((beyond - own) / 1e-3)  # disparity along this axis for one along u
-    # Along pixels alone: over views it would reach beyond the first and last, and flatten the lines.
+    per_u = np.float32((beyond - own) / 1e-3)  # disparity along this axis per disparity along u
+    # Along pixels only: along views it would reach beyond the first and last view, and flatten the lines.
     views = gaussian_filter1d(_sheared(arm, float(own)), inner, axis=axis, mode="nearest", truncate=3)
-    # The difference along one axis is smoothed along the other, (3, 10, 3)/16, so that both see a wave alike:
-    # their ratio is then the slope to 0.02·ω², ω in radians a pixel, an eighth of what plain differences are off.
+    # Each difference is smoothed along the other axis by (3, 10, 3)/16, so that both have the same response
+    # to a wave. Their ratio is then the slope with an error of 0.02·ω², ω in radians per pixel, an eighth of
+    # plain differences.
     by_view = correlate1d(views[2:] - views[:-2], _SMOOTHING, axis=axis, mode="nearest")
     smooth = _SMOOTHING[0] * (views[2:] + views[:-2]) + _SMOOTHING[1] * views[1:-1]
     by_pixel = per_u * correlate1d(smooth, (-1, 0, 1), axis=axis, mode="nearest")
@@ -341,7 +340,7 @@ def _tensor(arm: Arm, grid: Grid, shear: float, inner: float, outer: float) -> A
 
 
 def _orientation(tensor: Array) -> tuple[Array, Array, Array]:
-    """Slope of lines, how clear it is (0 to 1), and what varies over the views beside it; each (t, s)."""
+    """Slope of lines, its clarity (0 to 1), and the remaining variation over the views; each (t, s)."""
     j_ii, j_kk, j_ik = tensor
     spread = np.sqrt((j_kk - j_ii) ** 2 + 4 * j_ik**2)
     tilt = np.tan(0.5 * np.arctan2(2 * j_ik, j_kk - j_ii))

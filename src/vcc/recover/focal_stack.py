@@ -1,4 +1,4 @@
-"""Focal stacks: one light field focused on many distances, what is sharp in any of them, and films of them."""
+"""Focal stacks: a light field focused on many distances, with all-in-focus images and films."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ from vcc.recover.refocus import check_distance, refocused
 from vcc.store import StoredLightField
 
 _NOTHING_SHARP = 1e-12
-"""Sharpness relative to the picture's power below which there is no detail to choose by: all pictures count."""
+"""Sharpness relative to the image's power below which there is no detail: all images then count equally."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AllInFocus(Brief, Shown):
-    """What is sharp in any picture of a focal stack.
+    """The all-in-focus image of a focal stack.
 
     Args:
-        image: the picture, linear radiance, upright.
-        distance: where each pixel was found sharp, metres, (rows, columns): the mean of 1/Z over the pictures
-            taken for it, inverted. A by-product without confidence, which means little where there is no detail.
-        sharpness: the local contrast by which it was chosen, (pictures, rows, columns), in squared
-            units of the picture.
+        image: the image, linear radiance, upright.
+        distance: where each pixel is sharp, metres, (rows, columns): the inverse of the weighted mean of 1/Z over
+            the images. A by-product without confidence; unreliable where there is no detail.
+        sharpness: the local contrast that determines the weights, (images, rows, columns), in squared units of
+            the image.
     """
 
     image: Image
@@ -49,16 +49,15 @@ class AllInFocus(Brief, Shown):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FocalStack(Brief, Shown):
-    """Pictures of one scene from one place, each focused on another distance.
+    """Images of one scene from one viewpoint, each focused on another distance.
 
     Args:
-        pictures: linear, upright, float32, (pictures, rows, columns[, channels]), pixel on pixel.
-        distances: what each is focused on, metres, one for each picture.
-        frame: of each picture, see `vcc.Image`.
+        pictures: linear, upright, float32, (images, rows, columns[, channels]), registered pixel by pixel.
+        distances: focus distances, metres, one per image.
+        frame: of each image, see `vcc.Image`.
 
     Raises:
-        InputError: another number of distances than of pictures, a distance of zero or less, or samples that are
-            not finite.
+        InputError: a wrong number of distances, a distance that is not positive, or samples that are not finite.
     """
 
     pictures: NDArray[np.float32]
@@ -82,31 +81,31 @@ class FocalStack(Brief, Shown):
             raise InputError(f"a focal stack has finite samples; at index {bad} it has {self.pictures[bad]}")
 
     def image(self, number: int) -> Image:
-        """One picture of the stack, upright.
+        """One image of the stack, upright.
 
         Args:
-            number: which, from 0; negative counts from the end.
+            number: index from 0; negative values count from the end.
         """
         return Image(self.pictures[number], self.frame, inverted=False)
 
     def all_in_focus(
         self, *, window: float = 1.5, selectivity: float = 8.0, memory_limit: int | None = None
     ) -> AllInFocus:
-        """Extended depth of field: each pixel from the pictures that are sharp there.
+        """Extended depth of field: each pixel from the images that are sharp there.
 
         Sharpness S is the squared Laplacian, summed over a Gaussian window (energy of the Laplacian: Subbarao,
         Choi & Nikzad, *Focusing Techniques*, 1993; compared by Pertuz et al., *Analysis of focus measure operators
-        for shape-from-focus*, 2013). Pictures are averaged with weights S^selectivity, so that the choice changes
-        smoothly from pixel to pixel and shows no seams.
+        for shape-from-focus*, 2013). Images are averaged with weights S^selectivity, so that the selection changes
+        smoothly between pixels, without seams.
 
         Args:
-            window: standard deviation of the Gaussian, pixels: wider ones are safer against noise, and smear the
-                choice over edges in depth.
-            selectivity: 0 averages all pictures; infinite takes the sharpest alone.
-            memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+            window: standard deviation of the Gaussian, pixels: a wider one is more robust to noise, but blurs the
+                selection at edges in depth.
+            selectivity: 0 averages all images; infinity uses only the sharpest.
+            memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
         Raises:
-            InputError: a window of zero or less, a negative selectivity, or more memory needed than allowed.
+            InputError: a window that is not positive, a negative selectivity, or more memory needed than allowed.
         """
         from scipy import ndimage
 
@@ -133,7 +132,7 @@ class FocalStack(Brief, Shown):
             picture += (weight if each.ndim == 2 else weight[..., None]) * each
             vergence += weight / distance
         with np.errstate(divide="ignore"):
-            found = (1 / vergence).astype(np.float32)  # infinite where only the picture at infinity counts
+            found = (1 / vergence).astype(np.float32)  # infinite if only the image at infinity counts
         return AllInFocus(
             Image(picture.astype(np.float32), self.frame, inverted=False), found, sharpness.astype(np.float32)
         )
@@ -147,23 +146,23 @@ class FocalStack(Brief, Shown):
         there_and_back: bool = True,
         format: str | None = None,
     ) -> str:
-        """Write the stack as a film for people: MP4 (H.264) or GIF, sRGB.
+        """Write the stack as a film: MP4 (H.264) or GIF, sRGB.
 
         Args:
-            path: where to; ends in ``.mp4`` or ``.gif``. A GIF has 256 colours a frame, and plays over and over.
-                Or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
-            frames_per_second: pictures a second, at most 50 in a GIF, whose clock counts hundredths of a second.
-            exposure: factor before the sRGB curve, the same for all pictures; "auto" brings the 99.5th percentile
+            path: of the file; ends in ``.mp4`` or ``.gif``. A GIF has 256 colours per frame, and plays in a loop.
+                Or a buffer, such as ``io.BytesIO()``, or a file opened with "wb".
+            frames_per_second: at most 50 in a GIF, whose times are multiples of 1/100 s.
+            exposure: factor before the sRGB curve, the same for all images; "auto" maps the 99.5th percentile
                 of the brightest channels in the stack to white.
-            there_and_back: append the pictures in reverse order, so that the film can be played over and over.
+            there_and_back: append the images in reverse order, for a smooth loop.
             format: of a buffer: "mp4" or "gif".
 
         Returns:
-            A line for people: what was written, with which exposure, and how much of it clipped.
+            A line of text: the file, the exposure, and the share of clipped pixels.
 
         Raises:
-            InputError: another ending or format, a buffer without a format, an impossible rate, pictures of
-                neither 1 nor 3 channels, no PyAV for an MP4, or a place that cannot be written to.
+            InputError: an unsupported ending or format, a buffer without a format, an invalid frame rate,
+                images with neither 1 nor 3 channels, no PyAV for an MP4, or a file that cannot be written.
         """
         place = Destination.of("a focal stack", path, format, ENDINGS)
         film = Film(place.ending, frames_per_second)
@@ -190,15 +189,15 @@ class FocalStack(Brief, Shown):
 
 
 def focus_distances(nearest: float, farthest: float, count: int) -> tuple[float, ...]:
-    """Distances from near to far in equal steps of 1/Z, hence of disparity and of blur.
+    """Distances from near to far in equal steps of 1/Z, and so of disparity and blur.
 
     Args:
         nearest: metres.
         farthest: metres; may be infinite.
-        count: how many, 1 or more (1 gives the middle one).
+        count: how many, 1 or more (1 returns the middle one).
 
     Raises:
-        InputError: a distance of zero or less, the farther one nearer, or a count below 1.
+        InputError: a distance that is not positive, ``nearest`` beyond ``farthest``, or a count below 1.
     """
     for distance in (nearest, farthest):
         check_distance(distance, "a distance to focus on")
@@ -222,18 +221,18 @@ def focal_stack(
     progress: Progress | None = None,
     **options: Any,
 ) -> FocalStack:
-    """The light field focused on each of some distances by the ideal lens, see `vcc.recover.refocus.refocused`.
+    """The light field focused on several distances by the ideal lens, see `vcc.recover.refocus.refocused`.
 
     Args:
         light_field: in memory or on disk.
         distances: metres before its plane; see `focus_distances`.
-        memory_limit: bytes that the stack may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
-        progress: called with (pictures done, pictures).
-        options: diameter, centre, interpolation and between_views, as `refocused` has them.
+        memory_limit: bytes for the stack; None uses `vcc.base.memory.MEMORY_LIMIT`.
+        progress: called with (images done, images).
+        options: diameter, centre, interpolation and between_views, as for `refocused`.
 
     Raises:
-        InputError: no distances, one of zero or less, more memory needed than allowed, or what `refocused`
-            refuses.
+        InputError: no distances, a distance that is not positive, more memory needed than allowed, or an error of
+            `refocused`.
     """
     distances = tuple(float(distance) for distance in distances)
     if not distances:

@@ -1,9 +1,10 @@
-"""Heterodyne decoding: from a recording through a mask of cosines to the light field (Veeraraghavan et al. 2007).
+"""Heterodyne decoding: from a recording through a mask of cosines to a light field (Veeraraghavan et al. 2007).
 
-A mask close before the sensor multiplies the light field by cosines of a place between aperture and sensor. In the
-spectrum of the recording this lays copies of 2-D slices of the light field's 4-D spectrum side by side: tile n
-stands around n times the mask's frequency as the sensor sees it, and holds the spectrum along places of the sensor
-at one frequency across the aperture. Cut out, stacked and transformed back they are the light field.
+A mask close to the sensor multiplies the light field by cosines of a position between aperture and sensor. In the
+spectrum of the recording, this places copies of 2-D slices of the light field's 4-D spectrum side by side.
+Tile n is centred at n times the mask's frequency on the sensor. It contains the spectrum over positions on
+the sensor, at one frequency across the aperture. The tiles, cut out, stacked and inversely transformed, are
+the light field.
 """
 
 from __future__ import annotations
@@ -34,35 +35,34 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 WEAKEST: Final = 1e-3
-"""Carriers below this share of what the mask gives them are lost: their tiles would be noise."""
+"""Carriers below this share of their nominal strength count as lost: their tiles would be noise."""
 _WORKING_NUMBERS: Final = 16
-"""Tiles of recording and calibration, their quotient and views: four complex128 a sample, in float32 numbers."""
+"""Tiles of recording and calibration, their quotient and views: four complex128 per sample, counted in float32."""
 
 
 def heterodyne_calibration(
     camera: Camera, *, light_field: LightField | None = None, samples: int = 256, **options: Any
 ) -> Image:
-    """What the camera records of a white scene through a pinhole in the middle of its entrance plane.
+    """The calibration image: a recording of a white scene through a pinhole at the centre of the entrance plane.
 
-    It shows the mask's shadow alone, in which every carrier stands with the phase and the strength that it has in
-    any recording (Veeraraghavan et al. 2007 calibrate theirs by a recording too).
+    It shows the mask's shadow alone, with the phase and the strength that each carrier has in any recording
+    (Veeraraghavan et al. 2007 also calibrate with a recording).
 
     Args:
         camera: see `HeterodyneGeometry.of`.
-        light_field: one as finely sampled as that of a simulated recording, with a frame as `from_views` makes it:
-            the pinhole is then one cell of its views, the scene is made of its pixels, and the picture by
-            footprints: so the calibration also holds what samples of that size take away from the carriers. None
-            traces rays through a hole of `PINHOLE_SHARE` of the aperture period, and has no such losses.
-        samples: rays a pixel, where rays are traced.
+        light_field: sampled as finely as that of the simulated recording, with a frame as from `from_views`. The
+            pinhole is then one cell of its views, the scene consists of its pixels, and the image is computed with
+            footprints. The calibration thus includes the losses of carriers by this sampling. None traces rays
+            through a hole of `PINHOLE_SHARE` of the aperture period, without such losses.
+        samples: rays per pixel, if rays are traced.
         options: of `vcc.Camera.capture`, as for the recording (``interpolation``, ``refine``).
 
     Returns:
-        Irradiance on the sensor, float32, of a white scene as bright as gives radiance 1 through `PINHOLE_SHARE`
-        of the aperture period each way.
+        Irradiance on the sensor, float32, for a white scene of radiance 1 through a pinhole of `PINHOLE_SHARE` of
+        the aperture period along each axis.
 
     Raises:
-        InputError: what `HeterodyneGeometry.of` refuses, or a light field whose views or pixels do not run along
-            the axes.
+        InputError: as for `HeterodyneGeometry.of`, or a light field whose views or pixels are not along the axes.
     """
     setup = HeterodyneSetup.of(camera)
     if light_field is not None:
@@ -70,7 +70,7 @@ def heterodyne_calibration(
     geometry, sensor = setup.geometry, camera.sensor
     width, height = (PINHOLE_SHARE * period for period in geometry.aperture_period)
     hole = Mask(pattern=np.ones((1, 1)), width=width, height=height)
-    # Wider than anything that can be asked for; of one radiance, it needs few samples.
+    # Larger than the field of view; since it is uniform, few samples suffice.
     linear = np.zeros((4, 4))
     for axis in (0, 1):
         extent = max(abs(sensor.decentre[axis]) + geometry.pixels[axis] * geometry.pixel_pitch[axis], 1e-6)
@@ -91,7 +91,7 @@ def _calibrated_by_samples(setup: HeterodyneSetup, light_field: LightField, opti
     linear = frame.linear
     if np.count_nonzero(linear[:2] - np.diag(np.diag(linear))[:2]):
         raise InputError("the calibration takes a light field whose views stand in rows along the axes")
-    middle = np.linalg.solve(linear[:2, :2], -frame.offset[:2])  # the view, not a whole one, at (0, 0)
+    middle = np.linalg.solve(linear[:2, :2], -frame.offset[:2])  # fractional index of the view at (0, 0)
     one = frame @ Affine.translation(middle[0], middle[1], 0, 0)
     values = np.ones((1, 1, *light_field.shape[2:4]), np.float32)
     hole = Mask(pattern=np.ones((1, 1)), width=abs(float(linear[0, 0])), height=abs(float(linear[1, 1])))
@@ -113,36 +113,35 @@ def decode_heterodyne(
 ) -> LightField:
     """The light field in a recording through a mask of cosines: as many views along each axis as spectral tiles.
 
-    The spectrum of the recording, freed of the pixels' own transfer function, is cut into tiles around the
-    carriers that the camera's geometry gives; each tile is divided by that of the calibration, which takes off the
-    mask's phase and strength and the unevenness of the field; the stack of tiles is transformed back.
+    The spectrum of the recording, divided by the transfer function of the pixels, is cut into tiles around the
+    carriers, which follow from the camera's geometry. Each tile is divided by that of the calibration, which
+    removes the mask's phase and strength and the shading of the field. The stack of tiles is inversely
+    transformed.
 
-    A scene is decoded exactly if it fits the tiles: no detail on the sensor finer than two pixels of a view, and
-    across the aperture, at each place of the sensor, a sum of ``harmonics`` harmonics of one period. What is in
-    focus fits; what is not jumps from one end of the aperture to the other and rings in the outer views, the less
-    the smaller its parallax.
+    Decoding is exact for a scene that fits the tiles: on the sensor, no detail finer than two pixels of a view;
+    across the aperture, at each position on the sensor, a sum of ``harmonics`` harmonics of one period. Points in
+    focus fit. Points out of focus have a jump between the ends of the aperture and ring in the outer views,
+    less with smaller parallax.
 
     Args:
-        recording: irradiance, shape (rows, columns[, channels]): what `vcc.Camera.capture` gives, as it lies on
-            the sensor.
+        recording: irradiance, shape (rows, columns[, channels]), as `vcc.Camera.capture` returns it, inverted as
+            on the sensor.
         camera: see `HeterodyneGeometry.of`.
-        calibration: a white scene through a pinhole in the middle of the aperture, radiance 1 through a pinhole of
+        calibration: a white scene through a pinhole at the centre of the aperture, radiance 1 through a pinhole of
             `PINHOLE_SHARE` of the aperture period; None simulates it, `heterodyne_calibration`.
-        border: share of the sensor, 0 to 0.25, that recording and calibration fade out over along each edge, and
-            that is cut off the views. A Fourier transform takes what is beyond one edge for what is at the other;
-            0 is for scenes that are alike there, as black ones are, and carriers that fit a whole number of times.
-        memory_limit: bytes that the tiles and what is made of them may take; None takes
-            `vcc.base.memory.MEMORY_LIMIT`.
+        border: width of the fade-out of recording and calibration along each edge, 0 to 0.25 of the sensor; the
+            views are cropped by it. A Fourier transform treats opposite edges as neighbours; 0 is for scenes with
+            equal edges, such as black ones, and carriers with a whole number of periods on the sensor.
+        memory_limit: bytes for the tiles and the work on them; None uses `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (done, total): the calibration's tiles, and those of each channel.
 
     Returns:
-        float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; 0 where ringing
-        went below. Samples are values at points: a tile is freed of the pixels' mean.
+        float32 radiance, shape (v, u, t, s[, channels]), at the entrance plane, upright; negative values from
+        ringing are set to 0. Samples are values at points: the tiles are corrected for the pixels' averaging.
 
     Raises:
-        InputError: a recording or calibration of another size than the camera says, or with NaNs; a dark
-            calibration; a border out of range; more memory needed than allowed; or what `HeterodyneGeometry.of`
-            refuses.
+        InputError: a recording or calibration with NaNs, or of another size than the sensor; a dark calibration; a
+            border out of range; more memory needed than allowed; or an error of `HeterodyneGeometry.of`.
     """
     setup = HeterodyneSetup.of(camera)
     geometry = setup.geometry
@@ -185,7 +184,7 @@ def _checked(picture: Any, camera: Camera, what: str) -> Array:
 
 
 def _fade(size: int, border: float) -> Array:
-    """1 in the middle, raised cosines down to 0 at the edges."""
+    """1 in the middle, falling to 0 at the edges as a raised cosine."""
     if border == 0:
         return np.ones(size)
     away = np.minimum(np.arange(size) + 0.5, size - np.arange(size) - 0.5) / (border * size)
@@ -193,7 +192,7 @@ def _fade(size: int, border: float) -> Array:
 
 
 def _tiles(picture: Array, setup: HeterodyneSetup) -> Complex:
-    """The tiles, transformed back: (n_y, n_x, rows, columns), n from −harmonics up, as they lie on the sensor."""
+    """The inverse transforms of the tiles: (n_y, n_x, rows, columns), n from −harmonics, as on the sensor."""
     across = _tiles_along(picture.astype(np.complex128), setup, 0)  # (n_x, rows of pixels, columns)
     both = _tiles_along(np.moveaxis(across, 1, 2), setup, 1)  # (n_y, n_x, columns, rows)
     return np.moveaxis(both, 3, 2)
@@ -205,13 +204,14 @@ def _tiles_along(values: Complex, setup: HeterodyneSetup, axis: int) -> Complex:
     pixels, pitch = geometry.pixels[axis], geometry.pixel_pitch[axis]
     samples = geometry.shape[1 - axis]
     place = (setup.camera.sensor.column_places, setup.camera.sensor.row_places)[axis]
-    # Frequencies in a tile, in cycles over the sensor; of an even number the lowest has no partner and is dropped.
+    # Frequencies in a tile, in cycles over the sensor; an even number has an unpaired lowest one, which is
+    # dropped.
     bins = np.arange(-(samples // 2), samples - samples // 2)
     keep = np.ones(samples)
     if samples % 2 == 0:
         keep[0] = 0.0
     frequency = bins / (pixels * pitch)
-    # Places of the views' pixels: evenly over the sensor, each in the middle of its share.
+    # Positions of the views' pixels: evenly over the sensor, each at the centre of its share.
     shift = np.exp(2j * np.pi * frequency * setup.first_sample(axis))
     tiles = []
     for n in range(-geometry.harmonics, geometry.harmonics + 1):
@@ -232,11 +232,11 @@ def _sum_of_waves(spectrum: Complex, bins: NDArray[np.int64], samples: int) -> C
 
 
 def _check_carriers(strengths: Complex) -> None:
-    """Each carrier of the calibration against the one without any cosines."""
+    """Check the strength of each carrier of the calibration against the mean light."""
     level = np.abs(strengths).mean(axis=(2, 3))
     middle = level[level.shape[0] // 2, level.shape[1] // 2]
     harmonics = level.shape[0] // 2
-    # A cosine of the sum has 1/(4h), against the mean of 1/2.
+    # The relative strength of a cosine is 1/(4h), that of the mean 1/2.
     expected = (1 / (2 * harmonics)) ** 2
     if not middle > 0 or level.min() < WEAKEST * expected * middle:
         n_y, n_x = np.unravel_index(np.argmin(level), level.shape)
@@ -250,7 +250,7 @@ def _decoded(tiles: Complex, strengths: Complex, setup: HeterodyneSetup) -> Arra
     """Views (v, u, t, s), upright, of one channel."""
     geometry = setup.geometry
     level = np.abs(strengths).max(axis=(2, 3), keepdims=True)
-    # Where recordings fade out both are small, and what is cut off need not be divided by next to nothing.
+    # In the fade-out both are small; it is cropped later, so division by almost 0 is avoided there.
     slices = tiles * strengths.conj() / np.maximum(np.abs(strengths) ** 2, (1e-6 * level) ** 2)
     # A slice divided by its calibration is ∫ L·exp(2πi n·u/period) dΩ over the solid angle of the pinhole.
     slices *= setup.pinhole_solid_angle / setup.period_solid_angle

@@ -1,7 +1,7 @@
-"""What of a light field fits the tiles of a heterodyne camera: scenes for simulated recordings, and true views.
+"""Band-limited scenes for simulated heterodyne recordings, and the true views to compare with.
 
-On the sensor a tile holds detail up to half of the carrier; across the aperture, the first harmonics of one period
-(see `vcc.recover.heterodyne`). A real camera needs a scene that is no finer; a simulated one can be given it.
+On the sensor, a tile contains detail up to half of the carrier; across the aperture, the first harmonics of one
+period (see `vcc.recover.heterodyne`). A real camera needs a scene that is no finer; this module makes such scenes.
 """
 
 from __future__ import annotations
@@ -23,36 +23,36 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 MARGIN = 2
-"""Pixels of a decoded view by which a band-limited light field is larger than the sensor."""
+"""By how many pixels of a decoded view a band-limited light field is larger than the sensor, on each side."""
 
 
 def band_limited(
     light_field: LightField, camera: Camera, *, fineness: float = 1.0, samples: int = 5, parts: int = 4
 ) -> Iterator[LightField]:
-    """A light field without the detail on the sensor that would not fit a heterodyne camera's tiles.
+    """A light field without the detail on the sensor that exceeds the tiles of a heterodyne camera.
 
-    Each view is convolved, as it lies on the sensor, with sinc²: the transfer function falls along a straight line
-    to 0 at half the carrier, the end of a tile, and light stays positive. All views are sampled at the same places
-    of the sensor. Across the aperture nothing is filtered. Where a view ends on the sensor it goes on as its
-    edge.
+    Each view is convolved, as projected on the sensor, with sinc²: the transfer function falls linearly to 0
+    at half the carrier, the end of a tile, and light stays positive. All views are sampled at the same
+    positions of the sensor. Nothing is filtered across the aperture. Beyond the border of a view its edge is
+    repeated.
 
     Args:
-        light_field: of views in rows along the axes, at the entrance plane.
+        light_field: with views in rows along the axes, at the entrance plane.
         camera: see `HeterodyneGeometry.of`.
-        fineness: of the detail that is left, as a multiple of what tiles hold: 2 lets pass twice as high
-            frequencies, which aliases.
-        samples: for each pixel of a decoded view. The mask shifts copies of the scene, which its samples make at
-            multiples of the carrier times ``samples``, by up to ``harmonics`` carriers: with more samples than
-            harmonics none comes to lie on the tile in the middle.
-        parts: of the rows of samples, one at a time in memory; the light field is their sum.
+        fineness: of the remaining detail, relative to the capacity of the tiles: 2 passes frequencies twice
+            as high, which alias.
+        samples: per pixel of a decoded view. Sampling makes copies of the scene's spectrum at multiples of the
+            carrier times ``samples``, and the mask shifts them by up to ``harmonics`` carriers: with more samples
+            than harmonics, no copy overlaps the central tile.
+        parts: into which the rows of samples are divided, one in memory at a time; the light field is their sum.
 
     Yields:
         ``parts`` light fields of float32 radiance, (v, u, rows of samples, columns of samples[, channels]), whose
-        recordings add up to that of the whole. Samples are values at points of what is left.
+        recordings add up to that of the whole. Samples are values at points of the filtered scene.
 
     Raises:
-        InputError: views that do not lie along the axes, samples or parts below 1, a fineness of 0 or less, or
-            what `HeterodyneGeometry.of` refuses.
+        InputError: views that are not along the axes, samples or parts below 1, a fineness that is not
+            positive, or an error of `HeterodyneGeometry.of`.
     """
     if samples < 1 or parts < 1 or not fineness > 0:
         raise InputError(
@@ -77,23 +77,24 @@ def band_limited(
 
 
 def true_views(light_field: LightField, camera: Camera, decoded: LightField) -> LightField:
-    """The views that decoding should find: of the same frame as the decoded ones, and of what fits the tiles.
+    """The ideal result of decoding: views in the frame of the decoded ones, limited to what fits the tiles.
 
-    On the sensor they are low-passed as `band_limited` does it. Across the aperture, views in a row are taken for
-    samples of a periodic function, and the harmonics that the mask has carriers for are summed at the decoded
-    views' places; a light field with as many views as are decoded, at the same places, is not changed by that.
+    On the sensor they are low-pass filtered as in `band_limited`. Across the aperture, views in a row are
+    samples of a periodic function; the harmonics that have carriers in the mask are summed at the positions
+    of the decoded views. A light field with the same number of views at the same positions is not changed by
+    this.
 
     Args:
-        light_field: of views in rows along the axes, which fill the period across the aperture evenly.
+        light_field: with views in rows along the axes, which fill the period across the aperture evenly.
         camera: see `HeterodyneGeometry.of`.
-        decoded: what `vcc.recover.decode_heterodyne` returned; only its frame and shape count.
+        decoded: the result of `vcc.recover.decode_heterodyne`; only its frame and shape are used.
 
     Returns:
-        float32 radiance; 0 where the sum of harmonics rings below.
+        float32 radiance; negative values from ringing of the sum of harmonics are set to 0.
 
     Raises:
-        InputError: views that do not lie along the axes or do not fill the period, fewer views than the decoded
-            ones, or what `HeterodyneGeometry.of` refuses.
+        InputError: views that are not along the axes or do not fill the period, fewer views than decoded, or an
+            error of `HeterodyneGeometry.of`.
     """
     geometry = HeterodyneGeometry.of(camera)
     frame, landing = light_field.frame, _landing(camera) @ decoded.frame
@@ -120,10 +121,10 @@ def true_views(light_field: LightField, camera: Camera, decoded: LightField) -> 
 
 
 def places_on_sensor(light_field: LightField, camera: Camera, axis: int) -> Array:
-    """Where the pixels of views land on the sensor along an axis (0: x, 1: y): (views, pixels), metres.
+    """Positions on the sensor of the pixels of views, along an axis (0: x, 1: y): (views, pixels), metres.
 
     Raises:
-        InputError: views that do not lie along the axes.
+        InputError: views that are not along the axes.
     """
     if not np.allclose(skew(light_field.frame), 0):
         raise InputError("views must stand in rows along the axes, and so must their pixels")
@@ -140,30 +141,30 @@ def _landing(camera: Camera) -> Affine:
 
 
 def _ends(geometry: HeterodyneGeometry, fineness: float = 1.0) -> tuple[float, float]:
-    """Of the spectra that are left, cycles/metre."""
+    """Highest remaining frequencies (x, y), cycles/metre."""
     return fineness * geometry.carrier[0] / 2, fineness * geometry.carrier[1] / 2
 
 
 def _low_passed(
     light_field: LightField, camera: Camera, places: tuple[NDArray[Any], NDArray[Any]], ends: tuple[float, float]
 ) -> Floats:
-    """Views at places (x, y) of the sensor, low-passed to frequencies: (v, u, len(y), len(x)[, channels])."""
+    """Views at positions (x, y) of the sensor, low-pass filtered: (v, u, len(y), len(x)[, channels])."""
     right, down = (
         _kernel(places_on_sensor(light_field, camera, axis), places[axis], ends[axis]) for axis in (0, 1)
     )
-    across = np.ascontiguousarray(right.swapaxes(1, 2))[:, None]  # laid out as products of matrices are fast
+    across = np.ascontiguousarray(right.swapaxes(1, 2))[:, None]  # layout for fast matrix products
     views = light_field.shape[:2]
     values = np.empty((*views, len(places[1]), len(places[0]), *light_field.shape[4:]), np.float32)
     for row in range(views[0]):
         given = np.asarray(light_field.values[row], dtype=np.float32) / np.float32(light_field.full_scale)
         planes = np.moveaxis(given.reshape(*given.shape[:3], -1), -1, 1)
-        # The side that gets smaller first: fewer products.
+        # The axis that shrinks goes first: fewer operations.
         filtered = np.moveaxis((down[row] @ np.ascontiguousarray(planes)) @ across, 1, -1)
         values[row] = filtered.reshape(values.shape[1:])
     return values
 
 
 def _kernel(landed: Array, places: NDArray[Any], end: float) -> Floats:
-    """Weights of views' pixels at places: (views, places, pixels); its spectrum ends at ``end``, cycles/metre."""
+    """Weights of views' pixels at positions: (views, places, pixels); their spectrum ends at ``end``, 1/m."""
     weights = np.sinc((places[None, :, None] - landed[:, None, :]) * end) ** 2
     return np.asarray(weights / weights.sum(axis=2, keepdims=True), dtype=np.float32)

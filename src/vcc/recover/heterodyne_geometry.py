@@ -1,12 +1,12 @@
-"""Where the mask of a heterodyne camera puts the tiles of a recording's spectrum.
+"""The positions of the spectral tiles in recordings of a heterodyne camera.
 
-With x_s and x_m the places where a ray from place u of the entrance plane meets the sensor and the mask, and a
-cosine of period P in the mask::
+Let x_s and x_m be the positions where a ray from position u of the entrance plane meets the sensor and the
+mask. For a cosine of period P in the mask::
 
     x_m = γ·x_s + β·u + const    exp(2πi n x_m/P) = exp(2πi n γ/P · x_s) · exp(2πi n β/P · u)
                                                     the carrier of tile n   its frequency across the aperture
 
-so that the aperture is told apart over one period |P/β|, in as many views as there are tiles (2·harmonics + 1).
+so that views separate the aperture over one period |P/β|, in as many views as there are tiles (2·harmonics + 1).
 """
 
 from __future__ import annotations
@@ -35,15 +35,15 @@ _AXES = ("horizontally", "vertically")
 
 @dataclass(frozen=True)
 class HeterodyneGeometry:
-    """Where a camera's mask puts the spectral tiles; pairs are (horizontal, vertical).
+    """The positions of a camera's spectral tiles; pairs are (horizontal, vertical).
 
     Args:
         harmonics: cosines along each axis: there are 2·harmonics + 1 tiles and views.
         carrier: spacing of the tiles in the recording's spectrum, cycles per metre on the sensor.
-        aperture_period: |P/β|: the part of the entrance plane that views tell apart, metres; light from beyond it
-            would be taken for light from within.
-        aperture_sign: of β.
-        aperture: width and height of the opening at the entrance plane, metres; infinite where nothing bounds it.
+        aperture_period: |P/β|: the part of the entrance plane that views separate, metres; light from outside is
+            aliased into it.
+        aperture_sign: sign of β, for the direction of slopes on the sensor.
+        aperture: width and height of the opening at the entrance plane, metres; infinite if there is none.
         pixels: of the sensor.
         pixel_pitch: metres.
         sensitive: width and height of a pixel's sensitive area, metres.
@@ -60,24 +60,24 @@ class HeterodyneGeometry:
 
     @classmethod
     def of(cls, camera: Camera) -> HeterodyneGeometry:
-        """The geometry of a camera with a `vcc.Mask` of `vcc.patterns.CosineSum` and otherwise affine optics.
+        """The geometry of a camera with one `vcc.Mask` of `vcc.patterns.CosineSum` and otherwise affine optics.
 
         Raises:
-            InputError: no such mask, or several; optics that are not affine, or turn or mix the axes; a sensor
-                or a mask at an image of the entrance plane; tiles that overlap, in the spectrum of the recording
-                or across the aperture, with the period and the distance for which they would not.
+            InputError: no such mask, or several; optics that are not affine, or rotate or mix the axes; a
+                sensor or a mask at an image of the entrance plane; tiles that overlap in the recording's
+                spectrum or across the aperture. The message gives a period and a distance that avoid this.
         """
         return HeterodyneSetup.of(camera).geometry
 
     @property
     def views(self) -> int:
-        """Along each axis."""
+        """The number of views along each axis."""
         return 2 * self.harmonics + 1
 
     @property
     def shape(self) -> tuple[int, int]:
-        """(rows, columns) of a view: how many independent samples a tile holds."""
-        # A carrier may be a rounding error below a whole number of periods on the sensor.
+        """(rows, columns) of a view: the number of independent samples in a tile."""
+        # Rounding may leave a carrier slightly below a whole number of periods on the sensor.
         columns, rows = (
             math.floor(f * n * p + 1e-6)
             for f, n, p in zip(self.carrier, self.pixels, self.pixel_pitch, strict=True)
@@ -86,12 +86,13 @@ class HeterodyneGeometry:
 
     @property
     def noise_amplification(self) -> float:
-        """Noise of the decoded views over that of the recording, each as a share of what a grey card gives.
+        """Relative noise of the decoded views divided by that of the recording, both relative to a grey
+        card's value.
 
-        For noise that is alike and independent in all pixels. Along an axis with pixels of pitch p a tile holds
-        the share carrier·p of the recording's noise power. It is divided by the strength of the tile's cosine,
-        ½ in the middle and 1/(4·harmonics) elsewhere, and by what the pixels' area lets pass of its frequencies;
-        the power of all tiles adds up in every pixel of a view. A grey card is recorded at ¼.
+        For equal, independent noise in all pixels. Along an axis with pixels of pitch p, a tile contains the share
+        carrier·p of the recording's noise power. It is divided by the strength of the tile's cosine (½ for
+        the central tile, 1/(4·harmonics) for others) and by the pixels' transfer function. The powers of all
+        tiles add up in each pixel of a view. A grey card is recorded at ¼.
         """
         n = np.arange(-self.harmonics, self.harmonics + 1)
         strengths = np.where(n == 0, 0.5, 1 / (4 * self.harmonics))
@@ -106,7 +107,7 @@ class HeterodyneGeometry:
 
 @dataclass(frozen=True, eq=False)
 class HeterodyneSetup:
-    """A camera's geometry, and what of it a user need not see: scales between entrance plane, mask and sensor."""
+    """A camera's geometry with internal data: the scales between entrance plane, mask and sensor."""
 
     camera: Camera
     mask: Mask
@@ -115,10 +116,10 @@ class HeterodyneSetup:
 
     @classmethod
     def of(cls, camera: Camera) -> HeterodyneSetup:
-        """That of a camera.
+        """The setup of a camera.
 
         Raises:
-            InputError: what `HeterodyneGeometry.of` refuses.
+            InputError: as for `HeterodyneGeometry.of`.
         """
         mask, pattern = _carrier_mask(camera)
         for stage in camera.stages:
@@ -176,19 +177,19 @@ class HeterodyneSetup:
     @property
     @cached
     def pinhole_solid_angle(self) -> float:
-        """Of the calibration's pinhole, seen from the sensor: its area over |∂(x_s)/∂(slope)|²."""
+        """Solid angle of the calibration's pinhole, seen from the sensor: its area / |∂(x_s)/∂(slope)|²."""
         width, height = (PINHOLE_SHARE * period for period in self.geometry.aperture_period)
         return width * height * self._slopes_per_area
 
     @property
     def period_solid_angle(self) -> float:
-        """Of the period across the aperture, likewise."""
+        """Solid angle of the period across the aperture, seen from the sensor."""
         width, height = self.geometry.aperture_period
         return width * height * self._slopes_per_area
 
     @property
     def _slopes_per_area(self) -> float:
-        """dΩ at the sensor for each area of the entrance plane: 1/|b_x·b_y|, as phase space keeps its volume."""
+        """Solid angle at the sensor per area of the entrance plane: 1/|b_x·b_y|, as phase space is conserved."""
         return 1 / abs(float(self.to_sensor.matrix[0, 2] * self.to_sensor.matrix[1, 3]))
 
     def axis_frame(self) -> Affine:
@@ -201,19 +202,19 @@ class HeterodyneSetup:
         return Affine.from_parts(linear, offset)
 
     def first_sample(self, axis: int) -> float:
-        """Where on the sensor the first pixel of a view is centred along an axis (0: x, 1: y), metres."""
+        """Centre of a view's first pixel on the sensor, along an axis (0: x, 1: y), metres."""
         geometry = self.geometry
         whole = geometry.pixels[axis] * geometry.pixel_pitch[axis]
         samples = geometry.shape[1 - axis]
         return self.camera.sensor.decentre[axis] - whole / 2 + whole / samples / 2
 
     def turn(self, axis: int) -> int:
-        """−1 where slopes grow with places on the sensor, whose picture is upside down and is turned; else 1."""
+        """−1 if slopes grow with positions on the sensor, so that the image is inverted and is rotated; else 1."""
         return -1 if self.to_sensor.matrix[axis, axis + 2] > 0 else 1
 
 
 def _scales(at_mask: Affine, at_sensor: Affine, mask: str) -> list[tuple[float, float]]:
-    """(γ, β) along x and y, by the maps of rays from the entrance plane to the mask and to the sensor."""
+    """(γ, β) along x and y, from the maps of rays from the entrance plane to the mask and to the sensor."""
     for rays, what in ((at_mask, mask), (at_sensor, "the sensor")):
         blocks = rays.linear[:2].reshape(2, 2, 2).swapaxes(0, 1)
         if np.abs(blocks[:, [0, 1], [1, 0]]).max() > 1e-9 * np.abs(blocks).max():
@@ -244,7 +245,7 @@ def _two(numbers: Any) -> tuple[float, float]:
 
 
 def carrier_of(mask: Mask) -> CosineSum | None:
-    """The cosines of a mask, on a sheet of some size or not; None of one with another pattern."""
+    """The cosines of a mask, also on a bounded sheet; None for other patterns."""
     pattern = as_pattern(mask.pattern)  # type: ignore[arg-type]
     inner = pattern.pattern if isinstance(pattern, Bounded) else pattern
     return inner if isinstance(inner, CosineSum) else None

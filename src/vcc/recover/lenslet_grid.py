@@ -1,4 +1,4 @@
-"""Where micro-images are on a recording: the lattice of lenslets as pixels see it."""
+"""The lattice of micro-images on a recording, in pixels."""
 
 from __future__ import annotations
 
@@ -24,22 +24,21 @@ _ROUNDING = 1e-6  # of a pixel
 
 @dataclass(frozen=True)
 class LensletGrid:
-    """Where micro-images are on a recording: the affine image of a `vcc.shapes.lattice.Lattice`, in pixels.
+    """The positions of micro-images on a recording: an affine image of a `vcc.shapes.lattice.Lattice`, in pixels.
 
     Micro-image (a, b) is centred at origin + a·steps[0] + b·steps[1]; pixel (row, column) is centred at
-    x = column, y = row. The steps are not forced to be of one length or to an exact angle: pixels and lenslets of
-    real cameras are not exactly square.
+    x = column, y = row. The steps may differ in length and need no exact angle: pixels and lenslets of real
+    cameras are not exactly square.
 
     Args:
         layout: ``"square"`` or ``"hexagonal"``.
         origin: (x, y) of micro-image (0, 0), pixels.
-        steps: ((x, y), (x, y)), to the neighbours along the rows and along the next lattice direction, 90° or 60°
-            on, pixels.
-        residual: root mean square distance of the centres from the lattice that was fitted to them, pixels; 0 for
-            one that was not fitted.
+        steps: ((x, y), (x, y)), to the neighbours along the rows and along the next lattice direction, rotated by
+            90° or 60°, pixels.
+        residual: root mean square distance of the centres from the fitted lattice, pixels; 0 if it was not fitted.
 
     Raises:
-        InputError: an unknown layout, numbers that are not finite, steps along one line.
+        InputError: an unknown layout, numbers that are not finite, parallel steps.
     """
 
     layout: str
@@ -62,17 +61,17 @@ class LensletGrid:
 
     @property
     def pixel_from_steps(self) -> Affine:
-        """From steps (a, b) along the lattice to (x, y), pixels."""
+        """Map from steps (a, b) along the lattice to (x, y), pixels."""
         return Affine.from_parts(np.transpose(self.steps), self.origin)
 
     @property
     def pitch(self) -> float:
-        """Mean distance between neighbouring micro-images, pixels: the root of cell area over that of pitch 1."""
+        """Mean distance between neighbouring micro-images, pixels: √(cell area / cell area for pitch 1)."""
         return math.sqrt(abs(self.pixel_from_steps.determinant) / ROW_HEIGHT[self.layout])
 
     @property
     def pitches(self) -> tuple[float, float]:
-        """The same in columns and in rows of pixels, (x, y): they differ where pixels are not square."""
+        """The pitch in columns and in rows of pixels, (x, y): different if pixels are not square."""
         even = np.array([[1.0, 0.5], [0.0, ROW_HEIGHT[self.layout]]])
         if self.layout == "square":
             even[0, 1] = 0.0
@@ -81,7 +80,7 @@ class LensletGrid:
 
     @property
     def rotation(self) -> float:
-        """Of the rows of micro-images against the rows of pixels, radians, from x towards y."""
+        """Angle of the rows of micro-images to the rows of pixels, radians, from x towards y."""
         return math.atan2(self.steps[0][1], self.steps[0][0])
 
     def centre_of(self, a: ArrayLike, b: ArrayLike) -> Array:
@@ -89,51 +88,51 @@ class LensletGrid:
         return self.pixel_from_steps(np.stack(np.broadcast_arrays(a, b), axis=-1))
 
     def index_of(self, centres: ArrayLike) -> Array:
-        """(a, b), not rounded, of places (x, y) in pixels, shape (..., 2)."""
+        """(a, b), not rounded, of positions (x, y) in pixels, shape (..., 2)."""
         return self.pixel_from_steps.inverse()(centres)
 
     def nearest_to(self, place: ArrayLike) -> Array:
-        """(x, y) of the micro-image's centre next to a place (x, y), pixels."""
+        """(x, y) of the micro-image centre nearest to a position (x, y), pixels."""
         return self.pixel_from_steps(np.rint(self.index_of(place)))
 
     def turned(self, shape: tuple[int, int]) -> LensletGrid:
-        """The grid of a recording of ``shape`` (rows, columns) that was turned by 180°: the same steps."""
+        """The grid for a recording of ``shape`` (rows, columns), rotated by 180°; the steps stay the same."""
         (x, y), (rows, columns) = self.origin, shape
         return replace(self, origin=(columns - 1 - x, rows - 1 - y))
 
     @classmethod
     def from_lattice(cls, lattice: Lattice, sensor: Sensor) -> LensletGrid:
-        """The grid of a lattice of micro-images given in metres, as `vcc.LensArray.micro_images` gives it.
+        """The grid of a lattice of micro-images in metres, such as `vcc.LensArray.micro_images` returns.
 
         Args:
-            lattice: where micro-images are centred on the sensor.
-            sensor: whose pixels are counted.
+            lattice: centres of micro-images on the sensor.
+            sensor: defines the pixels.
         """
         return grid_of(lattice.layout, sensor.frame.inverse() @ lattice.place_from_steps)
 
     @classmethod
     def of_camera(cls, camera: Camera) -> LensletGrid:
-        """The grid by a camera's own geometry: where its lenslets image the middle of the entrance plane.
+        """The grid from a camera's geometry: where its lenslets image the centre of the entrance plane.
 
         Args:
             camera: with a `vcc.LensArray` as its last element and affine optics before it.
 
         Raises:
-            InputError: no lens array, something behind it, or one at the sensor.
+            InputError: no lens array, elements behind it, or a lens array at the sensor.
         """
         optics = LensletOptics.of(camera)
         return grid_of(optics.array.layout, camera.sensor.frame.inverse() @ optics.micro_image_from_steps)
 
     @classmethod
     def from_centres(cls, centres: ArrayLike) -> LensletGrid:
-        """The lattice that fits a list of micro-image centres best, in the sense of least squares.
+        """The least-squares lattice for a list of micro-image centres.
 
         Args:
-            centres: (x, y) of each, pixels counted from 0, any order, shape (..., 2). Rounded to whole pixels they
-                do: the fit averages.
+            centres: (x, y) of each, pixels counted from 0, in any order, shape (..., 2). Values rounded to
+                whole pixels suffice: the fit averages them.
 
         Raises:
-            InputError: fewer than 16 centres, numbers that are not finite, or no lattice.
+            InputError: fewer than 16 centres, numbers that are not finite, or centres that are not on a lattice.
         """
         points = np.asarray(centres, dtype=np.float64)
         if points.ndim < 2 or points.shape[-1] != 2 or points.size < 32:
@@ -157,7 +156,7 @@ class LensletGrid:
 
         Args:
             shape: (rows, columns) of the recording.
-            margin: pixels from the centres of its outermost pixels.
+            margin: distance in pixels from the centres of the outermost pixels.
         """
         last = np.array([shape[1] - 1, shape[0] - 1])
         corners = self.index_of([(x, y) for x in (0, last[0]) for y in (0, last[1])])
@@ -170,19 +169,19 @@ class LensletGrid:
 
 
 def grid_of(layout: str, pixel_from_steps: Affine, residual: float = 0.0) -> LensletGrid:
-    """The grid that a map from steps along the lattice to pixels makes.
+    """The grid for a map from lattice steps to pixels.
 
     Args:
         layout: ``"square"`` or ``"hexagonal"``.
         pixel_from_steps: from (a, b) to (x, y), pixels.
-        residual: of the centres that it was fitted to, pixels.
+        residual: of the fitted centres, pixels.
     """
     across, down = map(_pair, pixel_from_steps.linear.T)
     return LensletGrid(layout, _pair(pixel_from_steps.offset), (across, down), residual)
 
 
 def fitted(layout: str, labels: Array, points: Array) -> LensletGrid:
-    """The grid that fits centres best, in the sense of least squares.
+    """The least-squares grid for labelled centres.
 
     Args:
         layout: ``"square"`` or ``"hexagonal"``.
@@ -190,7 +189,7 @@ def fitted(layout: str, labels: Array, points: Array) -> LensletGrid:
         points: (x, y) of their centres, pixels, shape (n, 2).
 
     Raises:
-        InputError: they stand along one line.
+        InputError: the centres are on one line.
     """
     design = np.column_stack([labels, np.ones(len(labels))])
     solution, _, rank, _ = np.linalg.lstsq(design, points, rcond=None)
@@ -201,7 +200,7 @@ def fitted(layout: str, labels: Array, points: Array) -> LensletGrid:
 
 
 def _fitted_outwards(grid: LensletGrid, points: Array) -> tuple[LensletGrid, int]:
-    """Fitted to points near the origin, then further out: an error of the steps grows with the distance."""
+    """Fit a grid to points near its origin, then farther out: errors of the steps grow with the distance."""
     away = np.linalg.norm(points - grid.origin, axis=1)
     radius, used = 3 * grid.pitch, 0
     while True:
@@ -224,10 +223,10 @@ def _pair(numbers: Array) -> Pair:
 
 
 def _lattice_near(points: Array) -> Lattice:
-    """The lattice that the nearest neighbours of points show, its cell (0, 0) at the point in their middle.
+    """The lattice estimated from nearest neighbours of points, with cell (0, 0) at the central point.
 
     Raises:
-        InputError: points that coincide, or that stand on no lattice.
+        InputError: points that coincide, or that are not on a lattice.
     """
     from scipy.spatial import KDTree
 
@@ -238,7 +237,7 @@ def _lattice_near(points: Array) -> Lattice:
     near = distance[:, 1:] < 1.2 * pitch  # on a square lattice the diagonal neighbour is 1.41 away
     vectors = (points[neighbour[:, 1:]] - points[:, None])[near]
     turns = np.exp(1j * np.arctan2(vectors[:, 1], vectors[:, 0]))
-    folds = {"square": 4, "hexagonal": 6}  # by so many turns a layout comes to lie on itself
+    folds = {"square": 4, "hexagonal": 6}  # rotational symmetry
     order = {layout: np.mean(turns**fold) for layout, fold in folds.items()}
     layout = max(order, key=lambda name: abs(order[name]))
     if abs(order[layout]) < 0.5:

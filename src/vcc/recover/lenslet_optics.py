@@ -1,6 +1,6 @@
-"""What a camera with lenslets before its sensor makes of the middle of its entrance plane: a micro-image each.
+"""The micro-images of the centre of the entrance plane, for a camera with lenslets.
 
-And its aberrations, taken out of a light field afterwards.
+Also: correction of lens aberrations in a light field.
 """
 
 from __future__ import annotations
@@ -25,9 +25,8 @@ class LensletOptics:
     Args:
         array: the lenslets.
         gap: from them to the sensor, metres.
-        rays_at_array: from rays at the entrance plane to rays that arrive at the lenslets.
-        sensor_from_array: from the place of a lenslet to that where it images the middle of the entrance plane,
-            metres.
+        rays_at_array: map from rays at the entrance plane to rays that arrive at the lenslets.
+        sensor_from_array: map from a lenslet's position to its image of the centre of the entrance plane, metres.
     """
 
     array: LensArray
@@ -37,11 +36,11 @@ class LensletOptics:
 
     @classmethod
     def of(cls, camera: Train) -> LensletOptics:
-        """Those of a camera.
+        """The lenslet optics of a camera.
 
         Raises:
-            InputError: no lens array as its last element, one on the sensor, or one at an image of the entrance
-                plane.
+            InputError: no lens array as the last element, a lens array on the sensor, or one at an image of the
+                entrance plane.
         """
         array = camera.elements[-1] if camera.elements else None
         if not isinstance(array, LensArray):
@@ -53,7 +52,7 @@ class LensletOptics:
         if not gap > 0:
             raise InputError(f"{array.label} lies on the sensor: micro-images need a distance between them")
         rays = camera.rays_at(array.z, before=True)
-        # A ray from (0, 0) at slope σ arrives at B·σ + o with slope D·σ + q: its slope follows from its place.
+        # A ray from (0, 0) with slope σ arrives at B·σ + o with slope D·σ + q: its position determines its slope.
         position, slope = rays.linear[:2, 2:], rays.linear[2:, 2:]
         if abs(np.linalg.det(position)) < 1e-12:
             raise InputError(
@@ -66,36 +65,36 @@ class LensletOptics:
 
     @property
     def micro_image_from_steps(self) -> Affine:
-        """From steps along the lattice of lenslets to the centres of micro-images on the sensor, metres."""
+        """Map from steps along the lattice of lenslets to the centres of micro-images on the sensor, metres."""
         array = self.array
         return self.sensor_from_array @ Affine.translation(*array.decentre) @ array.lattice.place_from_steps
 
 
-# --- aberrations taken out of a light field after it was recorded (Ng and Hanrahan 2006) ---
+# --- correction of aberrations in a recorded light field (Ng and Hanrahan 2006) ---
 
 
 _TURNED = 1e-9
-"""Share of a pixel's step in slope by which it may leave its axis: rounding."""
+"""Largest component of a pixel's slope step along the other axis, relative: rounding."""
 
 
 def without_aberration(light_field: LightField, surface: Surface) -> LightField:
-    """Each view moved back by the slopes that a known plate at the views' plane has added to its rays.
+    """Correct a light field for a known aberration: shift each view by the slopes that a plate added to its rays.
 
-    A ray that came at the slope s to the place u of the plate is recorded at s + Δs(u) by a camera that takes
-    its lens for perfect. A light field tells the places apart, and each view can be put right by itself (R. Ng and
-    P. Hanrahan, *Digital correction of lens aberrations in light field photography*, 2006). Views are read by
-    cubic splines between pixels, go on beyond their borders as they end there, and stay 0 or more.
+    A ray that arrives with slope s at position u of the plate is recorded at s + Δs(u) by a camera that assumes a
+    perfect lens. A light field separates these positions, so each view can be corrected on its own (R. Ng and
+    P. Hanrahan, *Digital correction of lens aberrations in light field photography*, 2006). Views are
+    interpolated by cubic splines, repeated beyond their borders, and clipped at 0.
 
     Args:
-        light_field: in memory, at the plane of the plate, its pixels along s and t. A view is taken as one place:
-            its middle.
-        surface: of the plate, a `vcc.surfaces.Surface`, whose gradient is Δs.
+        light_field: in memory, at the plane of the plate, its pixels along s and t. The centre of each view counts
+            as its position.
+        surface: of the plate, a `vcc.surfaces.Surface`; its gradient is Δs.
 
     Returns:
         Float32 samples in the same frame.
 
     Raises:
-        InputError: a light field on disk or with turned pixels, or a plate that moves a view by more than its
+        InputError: a light field on disk or with rotated pixels, or a plate that shifts a view by more than its
             width.
     """
     from scipy.ndimage import shift

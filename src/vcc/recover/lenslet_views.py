@@ -1,4 +1,4 @@
-"""Views put together from the pixels at one place of all micro-images."""
+"""Views assembled from the pixels at the same position in all micro-images."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Whole = NDArray[np.int64]
 
-_ON_A_LENSLET = 1e-6  # of a step: what rounding leaves beside a lenslet is on it
+_ON_A_LENSLET = 1e-6  # of a step: rounding tolerance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LensletViews(Brief):
-    """From micro-images to the pixels of a view: which three or four each pixel lies between, and how near.
+    """Interpolation from micro-images to the pixels of a view: three or four micro-images per pixel, with weights.
 
     Args:
         shape: (rows, columns) of a view.
-        start: (x, y) on the recording of the view's first pixel, as it lies on the sensor, pixels.
+        start: (x, y) of the view's first pixel on the recording, inverted as on the sensor, pixels.
         step: between the view's pixels, pixels of the recording.
-        centres: of the micro-images that are read, (n, 2), pixels.
-        corners: which of these each pixel is made of, (pixels, 3 or 4).
-        weights: of each, summing to 1.
+        centres: of the micro-images used, (n, 2), pixels.
+        corners: indices of the micro-images for each pixel, (pixels, 3 or 4).
+        weights: of the corners, summing to 1.
     """
 
     shape: tuple[int, int]
@@ -42,16 +42,16 @@ class LensletViews(Brief):
 
     @classmethod
     def of(cls, grid: LensletGrid, shape: tuple[int, int], furthest: float, step: float) -> LensletViews:
-        """The views that a recording holds.
+        """The views in a recording.
 
         Args:
             grid: of its micro-images.
             shape: (rows, columns) of the recording.
-            furthest: from the centres of micro-images to the places that are read, along an axis, pixels.
+            furthest: largest distance along an axis from micro-image centres to the pixels read, pixels.
             step: between the view's pixels, pixels of the recording.
 
         Raises:
-            InputError: the recording holds no four whole micro-images, or no whole view.
+            InputError: a recording with fewer than four whole micro-images, or without a whole view.
         """
         index = grid.within(shape, furthest)
         if len(index) < 4:
@@ -61,7 +61,7 @@ class LensletViews(Brief):
         across, down = _axes(grid, shape, furthest, step)
         corners, weights = _around(grid, np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 2))
         found = _places_of(corners, index)
-        # A neighbour that counts for nothing need not be on the recording.
+        # A neighbour of weight 0 need not be on the recording.
         weights = np.where(found >= 0, weights, 0.0)
         weights /= weights.sum(axis=1, keepdims=True)
         return cls(
@@ -74,15 +74,15 @@ class LensletViews(Brief):
         )
 
     def view(self, planes: Floats, told: Floats | None, offset: tuple[float, float]) -> tuple[Floats, int]:
-        """One view, as it lies on the sensor, and how many of its pixels are missing.
+        """One view, inverted as on the sensor, and the number of its missing pixels.
 
         Args:
             planes: of the recording, (channels, rows, columns).
-            told: 1 where light tells something and 0 where it does not, (rows, columns); None is 1 everywhere.
-            offset: (x, y) from the centres of micro-images to the pixels that the view sees, pixels.
+            told: 1 where pixels are valid, otherwise 0, (rows, columns); None is 1 everywhere.
+            offset: (x, y) from the centres of micro-images to the pixels of the view, pixels.
 
         Returns:
-            (rows, columns, channels); 0 where nothing around tells anything.
+            (rows, columns, channels); 0 where no surrounding micro-image is valid.
         """
         x, y = (self.centres[:, n] + offset[n] for n in (0, 1))
         weights = self.weights
@@ -98,9 +98,9 @@ class LensletViews(Brief):
 
 
 def _axes(grid: LensletGrid, shape: tuple[int, int], furthest: float, step: float) -> list[Array]:
-    """Columns and rows of the recording on which a view's pixels lie, one on a micro-image's centre."""
+    """Columns and rows of the recording for the view's pixels, one of them at a micro-image's centre."""
     aligned = grid.layout == "square" and np.allclose(np.array(grid.steps), step * np.eye(2), atol=1e-6 * step)
-    # A place between lenslets needs all that are around it.
+    # A position between lenslets needs all lenslets around it.
     margin = furthest + (0.0 if aligned else grid.pitch)
     axes = []
     for place, size in zip(grid.nearest_to(((shape[1] - 1) / 2, (shape[0] - 1) / 2)), shape[::-1], strict=True):
@@ -113,7 +113,7 @@ def _axes(grid: LensletGrid, shape: tuple[int, int], furthest: float, step: floa
 
 
 def _places_of(corners: Whole, index: Whole) -> Whole:
-    """Where pairs (a, b), (..., 2), stand in a list of pairs, (n, 2); −1 for those that do not."""
+    """Indices of pairs (a, b), (..., 2), in a list of pairs, (n, 2); −1 if not in the list."""
     low, high = index.min(axis=0), index.max(axis=0)
     table = np.full(high - low + 1, -1)
     table[tuple((index - low).T)] = np.arange(len(index))
@@ -122,7 +122,7 @@ def _places_of(corners: Whole, index: Whole) -> Whole:
 
 
 def _around(grid: LensletGrid, places: Array) -> tuple[Whole, Array]:
-    """(a, b) of the micro-images around places, (n, corners, 2), and their weights, (n, corners)."""
+    """(a, b) of the micro-images around positions, (n, corners, 2), and their weights, (n, corners)."""
     index = grid.index_of(places)
     nearest = np.rint(index)
     index = np.where(np.abs(index - nearest) < _ON_A_LENSLET, nearest, index)
@@ -132,7 +132,7 @@ def _around(grid: LensletGrid, places: Array) -> tuple[Whole, Array]:
         corners = np.array([(0, 0), (1, 0), (0, 1), (1, 1)])
         weights = np.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], axis=-1)
         return (base[:, None] + corners).astype(np.int64), weights
-    # The rhombus between four centres is two equilateral triangles, parted where a + b = 1.
+    # The rhombus between four centres consists of two equilateral triangles, divided at a + b = 1.
     beyond = (a + b > 1)[:, None]
     corners = np.where(
         beyond[..., None], np.array([(1, 1), (0, 1), (1, 0)])[None], np.array([(0, 0), (1, 0), (0, 1)])[None]

@@ -1,9 +1,9 @@
-"""Plenoptic decoding: from the raw recording of a camera with a sheet of lenslets to its light field.
+"""Plenoptic decoding: from the raw recording of a camera with lenslets to a light field.
 
-Each lenslet images the main lens: a pixel at δ from the centre of its micro-image saw the place −δ·d/b of the main
-lens, through the place of the lenslet (d from main lens to lenslets, b from these to the sensor; Ng et al. 2005).
-The pixels at one δ from all centres, put side by side, are therefore one view. What is needed is where the centres
-are: known from the camera, given, or found in a recording of something white.
+Each lenslet images the main lens: a pixel at δ from the centre of its micro-image sees position −δ·d/b of the main
+lens, through the position of the lenslet (d from main lens to lenslets, b from lenslets to sensor; Ng et al.
+2005). The pixels at the same δ from all centres form one view. The centres must be known: from the camera, as
+a given grid, or from a recording of a white scene.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Floats = NDArray[np.float32]
 ColorFilter = str | tuple[str, ...]
 
 _UNKNOWN_SPACING = 1e-3
-"""Between views whose camera is not known, metres."""
+"""Spacing of views if the camera is unknown, metres."""
 
 
 def decode_plenoptic(
@@ -60,44 +60,44 @@ def decode_plenoptic(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> LightField:
-    """The light field that a plenoptic camera recorded: a picture for each place in a micro-image.
+    """The light field that a plenoptic camera recorded: one view per position in the micro-images.
 
-    In this order: the dark frame is subtracted, the recording divided by the white image (devignetting), mosaics
-    are demosaiced, each view is read, linearly between pixels, at its place in all micro-images, and put on a
-    square grid along the sensor's rows: linearly between lenslets (between the three around a place on a
-    hexagonal lattice), without any interpolation where an unrotated square lattice gives such a grid by itself.
+    The steps: subtract the dark frame; divide by the white image (devignetting); demosaic; read each view at its
+    position in all micro-images, linearly between pixels; resample it to a square grid along the sensor's
+    rows, linearly between lenslets (between the three surrounding lenslets on a hexagonal lattice). An
+    unrotated square lattice is such a grid already and is not interpolated.
 
     Args:
         recording: numbers proportional to light, shape (rows, columns[, channels]), or (rows, columns) behind a
-            colour filter; what `vcc.Camera.capture` or `expose` give.
-        grid: of the micro-images; None finds it in ``white``, or else takes the camera's own.
-        camera: the optics: affine ones, then a `vcc.LensArray`, then the sensor. With it the frame is metric, at
-            the camera's entrance plane. Without it views are 1 mm apart, converge on infinity, and a picture is
-            as wide as its distance: disparities are right, distances are not.
-        white: a recording of something evenly white; of one of radiance 1, the result is radiance.
-        dark: a recording without light, for both.
-        color_filter: of an array's mosaic, "RGGB" and its like (`vcc.Electronics`).
+            colour filter; as returned by `vcc.Camera.capture` or `expose`.
+        grid: of the micro-images; None finds it in ``white``, or else uses the camera's.
+        camera: affine optics, then a `vcc.LensArray`, then the sensor. The frame is then metric, at the camera's
+            entrance plane. Without a camera, views are 1 mm apart, converge at infinity, and an image is as
+            wide as its distance: disparities are correct, distances are not.
+        white: a recording of a uniform white scene; if its radiance is 1, the result is radiance.
+        dark: a recording without light, subtracted from both.
+        color_filter: of an array's mosaic, such as "RGGB" (`vcc.Electronics`).
         demosaicing: see `vcc.Recording.demosaiced`.
-        views: how many, one number or (rows, columns); None takes all that the micro-images' inner circle holds.
+        views: how many, one number or (rows, columns); None uses all within the inner circle of micro-images.
         view_step: between views, pixels within a micro-image.
-        step: between pixels of a view, pixels of the recording; None takes the lenslets' pitch, or for hexagonal
-            lattices its √(√3/2), which keeps the number of samples.
-        inverted: whether the recording is as light lands on the sensor, upside down, which is then turned. Views
-            are upright either way.
-        memory_limit: bytes that the light field may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
-        progress: called with (views done, of how many).
+        step: between pixels of a view, pixels of the recording; None uses the lenslets' pitch, for hexagonal
+            lattices times √(√3/2), which preserves the number of samples.
+        inverted: whether the recording is upside down, as light lands on the sensor. Views are upright in either
+            case.
+        memory_limit: bytes for the light field; None uses `vcc.base.memory.MEMORY_LIMIT`.
+        progress: called with (views done, views).
 
     Returns:
-        float32, shape (v, u, t, s[, channels]), upright; 0 where the white image is dark, and where noise went
-        below 0.
+        float32, shape (v, u, t, s[, channels]), upright; 0 where the white image is dark. Negative noise is set
+        to 0.
 
     Warns:
-        ResultWarning: more than 1 % of the samples lie where the white image is dark.
+        ResultWarning: more than 1 % of the samples are where the white image is dark.
 
     Raises:
-        InputError: neither grid nor white image nor camera; pictures of different sizes, or of another size than
-            the camera says; a dark white image; a grid of another pitch than the camera's; views that do not fit
-            into a micro-image; NaNs; more memory needed than allowed.
+        InputError: neither grid nor white image nor camera; images whose sizes differ from each other or from the
+            sensor's; a dark white image; a grid whose pitch differs from the camera's; views that do not fit in a
+            micro-image; NaNs; more memory needed than allowed.
     """
     prepared = _Prepared.of(recording, camera, white, dark, color_filter)
     grid = _chosen_grid(grid, camera, white, dark, prepared.color_filter is not None, inverted)
@@ -126,7 +126,7 @@ def _read(
     turn: int,
     progress: Progress | None,
 ) -> Floats:
-    """All views, (v, u, rows, columns, channels), 0 or more, turned by 180° where ``turn`` is −1."""
+    """All views, (v, u, rows, columns, channels), 0 or more, rotated by 180° if ``turn`` is −1."""
     values = np.zeros((*counts, *lenslets.shape, len(planes)), np.float32)
     missing = 0
     for row, column in np.ndindex(*counts):
@@ -152,8 +152,8 @@ class _Prepared:
 
     Args:
         raw: shape (rows, columns[, channels]).
-        told: 1 where the white image is bright, 0 where it is not, (rows, columns); None without one.
-        color_filter: of the mosaic that the recording still holds, or None.
+        told: 1 where the white image is bright, otherwise 0, (rows, columns); None without a white image.
+        color_filter: of the recording's mosaic, or None.
     """
 
     raw: Array
@@ -190,7 +190,7 @@ class _Prepared:
         return cls(raw / np.maximum(light, faintest), (shown >= faintest).astype(np.float32), kept)
 
     def demosaiced(self, method: Demosaicing) -> Array:
-        """All channels of a mosaic whose numbers are no longer those of a sensor."""
+        """Demosaic the devignetted recording."""
         if self.color_filter is None:
             return self.raw
         electronics = Electronics(color_filter=self.color_filter)
@@ -254,7 +254,7 @@ def _frame(
     sign = -1.0 if inverted else 1.0
     rows, columns = lenslets.shape
     sensor_from_pixel = camera.sensor.frame
-    if not inverted:  # the recording was turned by 180° after it was made
+    if not inverted:  # the recording was rotated by 180°
         height, width = camera.sensor.shape
         turned = Affine(np.array([[-1.0, 0, width - 1], [0, -1.0, height - 1], [0, 0, 1]]))
         sensor_from_pixel = sensor_from_pixel @ turned

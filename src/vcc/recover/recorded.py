@@ -1,4 +1,4 @@
-"""The numbers of what decoders and deblurring are given: pictures, raw recordings, or plain arrays."""
+"""Input of decoders and deblurring as plain arrays: from images, raw recordings, or arrays."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ Array = NDArray[np.float64]
 
 
 def numbers_of(picture: Image | Recording | ArrayLike, what: str) -> Array:
-    """The numbers of a picture, or those of a raw recording's pixels, as they are.
+    """The values of an image, or the pixel values of a raw recording, without demosaicing.
 
     Args:
         picture: shape (rows, columns[, channels]).
-        what: to call it in an error.
+        what: name in error messages.
 
     Returns:
         The same shape, float64.
 
     Raises:
-        InputError: another number of axes, an empty one, or numbers that are not finite.
+        InputError: a wrong number of axes, an empty image, or values that are not finite.
     """
     given: Any = picture.image() if isinstance(picture, Recording) else picture
     values = np.asarray(to_numpy(given.values) if isinstance(given, Image) else given, dtype=np.float64)
@@ -43,10 +43,10 @@ def numbers_of(picture: Image | Recording | ArrayLike, what: str) -> Array:
 
 
 def grey(values: Array) -> Array:
-    """The mean over channels, where there are some: shape (rows, columns)."""
+    """The mean over channels, if there are any: shape (rows, columns)."""
     return values if values.ndim == 2 else np.asarray(values.mean(axis=2))
 
 
 def has_mosaic(picture: Any) -> bool:
-    """Whether a picture is a raw recording through a mosaic of colour filters."""
+    """Whether an input is a raw recording with a colour filter mosaic."""
     return isinstance(picture, Recording) and picture.electronics.color_filter is not None

@@ -1,4 +1,4 @@
-"""Pictures from light fields: focused elsewhere by the ideal lens, and seen from places between the views."""
+"""Images from light fields: refocused by the ideal lens, and interpolated between the views."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from vcc.shapes import patterns
 from vcc.store import StoredLightField
 
 IMAGE_DISTANCE = 50e-3
-"""How far behind the lens the sensor of the ideal camera stands, metres. Pictures do not depend on it: pixels and
-irradiance scale with it, and both are divided out."""
+"""Distance from the lens to the sensor of the ideal camera, metres. Images do not depend on it: the scale of
+pixels and irradiance is divided out."""
 SWEEP_STEP = 0.25
-"""By how much a plane sweep moves the views against each other from plane to plane, at most, pixels."""
+"""Largest shift between neighbouring planes of a plane sweep, pixels per view."""
 SWEEP_WINDOW = 2.5
 """Standard deviation of the Gaussian over which a plane sweep compares views, pixels."""
 MOST_PLANES = 512
 _UNSEEN = 1e-6
-"""Pixels on which less than this share of the aperture falls were seen by no view: rounding of float32."""
+"""Pixels with a smaller share of the aperture count as seen by no view: rounding of float32."""
 
 
 def ideal_camera(
@@ -45,23 +45,23 @@ def ideal_camera(
     diameter: float | None = None,
     centre: tuple[float, float] = (0.0, 0.0),
 ) -> Camera:
-    """The perfect thin lens that focuses on a distance, before a sensor of the views' resolution.
+    """A perfect thin lens focused on a distance, with a sensor of the views' resolution.
 
-    The lens stands where the light field is given. The sensor stays `IMAGE_DISTANCE` d behind it, and the focal
-    length follows the thin-lens equation, 1/f = 1/d + 1/Z, so that all distances Z give pictures of the same
-    scale: a pixel is the step of one pixel of a view, and what stands at Z is found where the middle view sees it.
-    Capturing with it is the shift-and-add refocusing of Ng et al., *Light Field Photography with a Hand-held
-    Plenoptic Camera* (2005), with the footprints of samples in place of shifted points.
+    The lens is at the plane of the light field. The sensor stays `IMAGE_DISTANCE` d behind it, and the focal
+    length follows the thin-lens equation, 1/f = 1/d + 1/Z, so that images of all distances Z have the same
+    scale: a pixel is one pixel of a view, and points at Z are at their pixel in the middle view. Capturing
+    with this camera is the shift-and-add refocusing of Ng et al., *Light Field Photography with a Hand-held
+    Plenoptic Camera* (2005), with footprints of samples instead of shifted points.
 
     Args:
         light_field: in memory or on disk.
         distance: Z before the light field's plane, metres; may be infinite.
-        diameter: of the round aperture, metres; None takes all views.
-        centre: (u, v) of that aperture's middle, metres.
+        diameter: of the round aperture, metres; None uses all views.
+        centre: (u, v) of the aperture's centre, metres.
 
     Raises:
-        InputError: a distance or diameter of zero or less, a centre without a diameter, or a light field given in
-            the plane of that distance, where all pixels of a view show the same place.
+        InputError: a distance or diameter that is not positive, a centre without a diameter, or a light field
+            given at the plane of that distance, where all pixels of a view show the same point.
     """
     check_is_light_field(light_field)
     check_distance(distance, "distance")
@@ -83,7 +83,7 @@ def ideal_camera(
     x, y, _, _ = rays([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])
     sensor = Sensor(z=d, shape=(nt, ns), pitch=pitch, decentre=(float(x), float(y)))
     elements: list[Element] = [Lens(focal_length=focal_length)]
-    if diameter is not None:  # a mask rather than the lens's rim: the lens stays on the axis wherever the hole is
+    if diameter is not None:  # a mask, since the lens stays on the axis if the hole is off it
         elements.append(Mask(patterns.Circle(diameter), decentre=centre, name="aperture"))
     return Camera(elements, sensor)
 
@@ -99,31 +99,31 @@ def refocused(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Image:
-    """The picture focused on a distance, upright, as large as a view: the mean radiance over the aperture.
+    """The image focused on a distance, upright, with the pixels of a view: the mean radiance over the aperture.
 
-    Made by `ideal_camera`. Uniform radiance 1 gives 1 everywhere: each pixel is divided by the share of the
-    aperture that the given views cover there, which falls towards the borders of a picture out of focus.
+    Computed with `ideal_camera`. Uniform radiance 1 gives 1 everywhere: each pixel is divided by the share of the
+    aperture that the views cover, which falls towards the borders of an out-of-focus image.
 
     Args:
         light_field: in memory, or on disk and then read in pieces.
         distance: metres before the light field's plane; may be infinite.
-        diameter: of the round aperture, metres; None takes all views. Smaller ones have more depth of field.
-        centre: (u, v) of the aperture's middle, metres.
-        interpolation: within a view, see `vcc.Camera.capture`. ``"sharp"`` compensates after the
-            division by what the views cover, so that their borders do not ring.
-        between_views: whether ghosts of views too far apart are filled, see `vcc.Camera.capture`.
+        diameter: of the round aperture, metres; None uses all views. A smaller one has more depth of field.
+        centre: (u, v) of the aperture's centre, metres.
+        interpolation: within a view, see `vcc.Camera.capture`. ``"sharp"`` compensates after the division by the
+            coverage, so that borders of views do not ring.
+        between_views: whether to interpolate between views that are too far apart, see `vcc.Camera.capture`.
         memory_limit: for a light field on disk, see `vcc.Camera.capture`.
         progress: called with (done, total).
 
     Returns:
-        Linear radiance, float32, (rows, columns[, channels]); the frame is where pixels of the middle view look,
-        as `vcc.LightField.view` has it.
+        Linear radiance, float32, (rows, columns[, channels]); the frame is the viewing direction of the middle
+        view's pixels, as in `vcc.LightField.view`.
 
     Warns:
-        ResultWarning: pixels that no view saw, which are 0.
+        ResultWarning: pixels that no view sees, which are 0.
 
     Raises:
-        InputError: what `ideal_camera` and `vcc.Camera.capture` refuse, or an aperture that holds no view.
+        InputError: as for `ideal_camera` and `vcc.Camera.capture`, or an aperture that contains no view.
     """
     camera = ideal_camera(light_field, distance, diameter=diameter, centre=centre)
     sharp = interpolation == "sharp"
@@ -133,7 +133,8 @@ def refocused(
         "between_views": between_views,
     }
     with warnings.catch_warnings():
-        # "rays are missing; the picture is darker there": it is not, once divided by the coverage.
+        # The warning "rays are missing; the image is darker there" does not apply after division by the
+        # coverage.
         warnings.filterwarnings("ignore", message=".*of the rays that this camera asks for.*")
         warnings.filterwarnings(
             "ignore", message="the picture is 0 everywhere.*"
@@ -164,24 +165,24 @@ def refocused(
 
 
 def _sharpened(values: NDArray[np.float64], plan: Plan) -> NDArray[np.float64]:
-    """An image sharpened as a plan does; beyond its border it goes on as its edge."""
+    """An image sharpened as in a plan; its edge is repeated beyond its border."""
     from scipy.ndimage import convolve, convolve1d
 
     for operator in plan.after:
         if isinstance(operator, AlongAxes) and not any(operator.half_widths):
             for axis, weights in enumerate((operator.down, operator.across)):
                 values = convolve1d(values, weights, axis=axis, mode="nearest")
-        elif isinstance(operator, Blur):  # of a turned grid of pixels
+        elif isinstance(operator, Blur):  # for a rotated pixel grid
             kernel = operator.kernel if values.ndim == 2 else operator.kernel[..., None]
             values = convolve(values, kernel, mode="nearest")
     return values
 
 
 def _coverage(camera: Camera, grid: Grid, options: dict[str, Any]) -> NDArray[np.float64]:
-    """The picture of uniform radiance 1, (rows, columns), made row of views by row, without reading samples.
+    """The image of uniform radiance 1, (rows, columns), as a sum over rows of views, without reading samples.
 
-    Pieces of a light field are treated as the whole would be (its range of disparities is theirs too), and
-    their pictures add up.
+    Pieces of a light field are treated like the whole (with the same disparity range), so that their images
+    add up.
     """
     total = np.zeros(camera.sensor.shape)
     for row in range(grid.shape[0]):
@@ -201,29 +202,29 @@ def novel_view(
     scene_distance: float | None = None,
     progress: Progress | None = None,
 ) -> Image:
-    """What a camera between the views would see, interpolated along the scene's parallax.
+    """The view of a camera between the views, interpolated along the scene's parallax.
 
-    The four views around the place (two, or one, on the grid's lines) are moved to it by the parallax of a
-    distance and averaged with bilinear weights, as Levoy & Hanrahan, *Light Field Rendering* (1996), blend rays of
-    neighbouring cameras, with the depth correction of Gortler et al., *The Lumigraph* (1996). Where the
-    distance is not given, each pixel takes the one at which these views agree best within a Gaussian window
+    The four views around the position (two or one on the grid's lines) are shifted to it by the parallax of a
+    distance and averaged with bilinear weights. This blends rays of neighbouring cameras as in Levoy & Hanrahan,
+    *Light Field Rendering* (1996), with the depth correction of Gortler et al., *The Lumigraph* (1996). If the
+    distance is not given, each pixel uses the distance at which these views agree best within a Gaussian window
     (plane sweep: Collins, *A Space-Sweep Approach to True Multi-Image Matching*, 1996), among planes in equal
-    steps of disparity over the light field's range. A place that has a view gives exactly that view.
+    steps of disparity over the light field's range. At the position of a view, the result is exactly that view.
 
     Args:
-        light_field: in memory, of a grid of parallel cameras (places by view, slopes by pixel and view, axes not
-            mixed).
-        u: where the camera stands, metres to the right, inside the grid of views.
-        v: likewise downwards.
-        scene_distance: one distance of the whole scene, metres; None finds one for each pixel.
+        light_field: in memory, from a grid of parallel cameras (positions by view, slopes by pixel and view, axes
+            not mixed).
+        u: position of the camera, metres to the right, inside the grid of views.
+        v: position of the camera, metres downwards.
+        scene_distance: one distance for the whole scene, metres; None estimates it for each pixel.
         progress: called with (planes done, planes).
 
     Returns:
-        Linear radiance, float32, as `vcc.LightField.view` gives it, upright.
+        Linear radiance, float32, upright, as in `vcc.LightField.view`.
 
     Raises:
-        InputError: a place outside the views, a frame that mixes axes, a distance of zero or less, or a range of
-            disparities that is not known and cannot be measured.
+        InputError: a position outside the views, a frame that mixes axes, a distance that is not positive, or a
+            disparity range that is unknown and cannot be estimated.
     """
     i, j = _view_index(light_field, u, v)
     if scene_distance is not None:
@@ -254,7 +255,7 @@ def novel_view(
 
 
 class _Near:
-    """A view around a place: its index, its share, and its samples as splines."""
+    """A view around a position: its index, its weight, and its samples as splines."""
 
     def __init__(self, light_field: LightField, row: int, column: int, share: float) -> None:
         from scipy import ndimage
@@ -268,7 +269,7 @@ class _Near:
         )
 
     def moved(self, down: float, right: float) -> NDArray[np.float64]:
-        """The picture moved by so many pixels, (rows, columns, channels), its borders mirrored."""
+        """The image shifted by a number of pixels, (rows, columns, channels), its borders mirrored."""
         from scipy import ndimage
 
         if down == 0 and right == 0:
@@ -280,7 +281,7 @@ class _Near:
 
 
 def _views_around(light_field: LightField, i: float, j: float) -> list[_Near]:
-    """The views whose bilinear weight at (i, j) is above 0."""
+    """The views with a positive bilinear weight at (i, j)."""
     found = []
     for row in {math.floor(j), math.ceil(j)}:
         for column in {math.floor(i), math.ceil(i)}:
@@ -292,7 +293,7 @@ def _views_around(light_field: LightField, i: float, j: float) -> list[_Near]:
 def _blend(
     light_field: LightField, around: list[_Near], place: tuple[float, float], vergence: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The mean of the views at a place by the parallax of a plane, and how much they differ there, by pixel."""
+    """The mean of the views at a position for the parallax of a plane, and their local difference, by pixel."""
     from scipy import ndimage
 
     linear = light_field.frame.linear
@@ -308,7 +309,7 @@ def _blend(
             (index - by >= -1e-9) & (index - by <= len(index) - 1 + 1e-9)
             for index, by in zip((rows, columns), shift, strict=True)
         ]
-        # Views that do not reach a pixel count for next to nothing there, and for all where no other does.
+        # Views that do not reach a pixel have almost no weight there, unless no view reaches it.
         weights.append(near.share * np.where(inside[0][:, None] & inside[1], 1.0, 1e-9))
     pictures, shares = np.stack(moved), np.stack(weights)[..., None]
     mean = (shares * pictures).sum(axis=0) / shares.sum(axis=0)
@@ -317,7 +318,7 @@ def _blend(
 
 
 def _sweep(light_field: LightField) -> NDArray[np.float64]:
-    """The planes of a sweep, 1/metre, over the light field's range of disparities."""
+    """The planes of a sweep, 1/metre, over the light field's disparity range."""
     found = light_field.measured_disparity_range()
     if found is None:
         raise InputError(
@@ -326,7 +327,7 @@ def _sweep(light_field: LightField) -> NDArray[np.float64]:
         )
     ends = np.array([1 / light_field.distance_of(each) for each in found])
     linear = light_field.frame.linear
-    # A little farther at both ends: measured ranges are percentiles.
+    # A small margin at both ends: estimated ranges are percentiles.
     per_vergence = max(abs(linear[0, 0] / linear[2, 2]), abs(linear[1, 1] / linear[3, 3]))
     margin = SWEEP_STEP / per_vergence
     low, high = ends.min() - margin, ends.max() + margin
@@ -340,7 +341,7 @@ def _sweep(light_field: LightField) -> NDArray[np.float64]:
 
 
 def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, float]:
-    """(i, j) of a place on the grid of views."""
+    """(i, j) of a position in the grid of views."""
     linear, offset = light_field.frame.linear, light_field.frame.offset
     if np.abs(skew(light_field.frame)).max() > 1e-9 * np.abs(linear).max(axis=1).min():
         raise InputError(
@@ -366,9 +367,9 @@ def _view_index(light_field: LightField, u: float, v: float) -> tuple[float, flo
 
 
 def check_distance(distance: float, name: str) -> None:
-    """Refuse what is no distance to focus on.
+    """Check a distance to focus on.
 
     Raises:
-        InputError: zero or less, or NaN.
+        InputError: not positive, or NaN.
     """
     above_zero(name, distance, unit="m", infinite=True, way_out="it may be infinite")

@@ -1,9 +1,9 @@
-"""Depth from one picture through a biprism, by matching its two halves (Lee, Kweon and Cipolla 1999).
+"""Depth from one image through a biprism, by matching its two halves (Lee, Kweon and Cipolla 1999).
 
-Seen through either half of a biprism that bends light towards its ridge, a point seems to lie a way δ·Z to the
-side. The lens behind puts the two pictures of it on the two halves of the sensor, Δ = 2·δ·Z·d/(Z + a) apart, where
-Z is its distance before the biprism, a the way from there to the lens and d from the lens to the sensor. Other
-than blur, Δ grows with Z throughout: there are no two distances with one separation.
+Through either half of a biprism that deflects light towards its ridge, a point appears shifted sideways by
+δ·Z. The lens behind it forms two images of the point on the two halves of the sensor, Δ = 2·δ·Z·d/(Z + a)
+apart. Z is the distance before the biprism, a the distance from the biprism to the lens, and d from the lens
+to the sensor. Unlike blur, Δ is monotonic in Z: each separation corresponds to one distance.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from vcc.recover.recorded import grey, numbers_of
 Array = NDArray[np.float64]
 
 MANY_ENDED = 0.01
-"""The share of the blocks from which on it is said that their search ended."""
-_FLOOR = 2e-3  # of the brightest pixel: contrast below is no texture
+"""The share of blocks whose search ended at an end of the range from which on a warning is given."""
+_FLOOR = 2e-3  # of the brightest pixel: lower contrast is not texture
 _REFINEMENTS = 6
-_AHEAD = 0.05  # correlation by which the best match leads the next one, where it is trusted in full
+_AHEAD = 0.05  # lead in correlation of the best match that gives full confidence
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StereoDepth(Brief, Shown):
-    """The distances of blocks of the half picture on the right of the sensor (x > 0, as light lands).
+    """The distances of blocks of the right half of the image on the sensor (x > 0, inverted as light lands).
 
     Args:
-        separation: of the block's two pictures, pixels, shape (block rows, block columns); NaN where a block could
-            not be matched inside the picture.
-        distance: metres before the entrance plane, likewise; infinite where a separation is at or beyond that of
-            infinity; NaN where a block could not be matched, or best at an end of the range.
-        confidence: 0 (no texture, no match, or several alike) to 1, likewise.
-        rows: the row of each block's middle, pixels, shape (block rows,).
-        columns: likewise the column, shape (block columns,).
+        separation: of the block's two images, pixels, shape (block rows, block columns); NaN if a block has
+            no match inside the image.
+        distance: metres before the entrance plane, same shape; infinite for separations at or beyond that of
+            infinity; NaN if a block has no match, or the best match is at an end of the range.
+        confidence: 0 (no texture, no match, or several equal ones) to 1, same shape.
+        rows: the row of each block's centre, pixels, shape (block rows,).
+        columns: the column, shape (block columns,).
     """
 
     separation: Array
@@ -54,7 +54,7 @@ class StereoDepth(Brief, Shown):
 
 @dataclass(frozen=True)
 class BiprismStereo:
-    """A biprism before a lens as a stereo camera: separations and distances in closed form.
+    """A biprism before a lens as a stereo camera: analytic separations and distances.
 
     Args:
         deflection: δ of each half, a slope, greater than 0 (towards the ridge).
@@ -63,7 +63,7 @@ class BiprismStereo:
         behind: d, from the lens to the sensor, metres.
 
     Raises:
-        InputError: a deflection of 0 or less, or a biprism that is not before the lens.
+        InputError: a deflection that is not positive, or a biprism that is not before the lens.
     """
 
     deflection: float
@@ -86,17 +86,17 @@ class BiprismStereo:
 
     @classmethod
     def of(cls, camera: Camera) -> BiprismStereo:
-        """The stereo camera that a biprism and a lens make.
+        """The stereo camera formed by a biprism and a lens.
 
         Raises:
-            InputError: other elements than one biprism and one lens behind it, a biprism turned or elements off
-                the axis, or what `BiprismStereo` refuses.
+            InputError: elements other than one biprism and one lens behind it, a rotated biprism, elements
+                off the axis, or an error of `BiprismStereo`.
         """
         return _parts(camera)[0]
 
     @property
     def baseline(self) -> float:
-        """2·δ·a, metres: the distance of the two cameras that this one stands for."""
+        """2·δ·a, metres: the distance between the two equivalent cameras."""
         return 2 * self.deflection * self.ahead
 
     def separation_of(self, distance: float) -> float:
@@ -105,9 +105,9 @@ class BiprismStereo:
         return 2 * self.deflection * self.behind / (1 + self.ahead / away)
 
     def distance_of(self, separation: float) -> float:
-        """The distance before the entrance plane, metres: `separation_of` undone.
+        """The distance before the entrance plane, metres: the inverse of `separation_of`.
 
-        Infinite at the separation of infinity, 2·δ·d, and beyond.
+        Infinite for separations of 2·δ·d, that of infinity, and more.
         """
         rest = 2 * self.deflection * self.behind - separation
         return math.inf if rest <= 0 else self.ahead * separation / rest - self.place
@@ -118,24 +118,24 @@ def depth_by_biprism(
 ) -> StereoDepth:
     """Depth from a recording through a biprism and a lens.
 
-    Blocks of the right half picture are found in the left one by normalised correlation over the separations of
-    the range, then to a fraction of a pixel by least squares over separation, gain and offset (Lucas and Kanade
-    1981, with cubic splines between pixels). Left out is the strip in the middle of the sensor where light of both
-    halves arrives.
+    Blocks of the right half are matched in the left half by normalised correlation over the range of
+    separations, then refined to a fraction of a pixel by least squares over separation, gain and offset
+    (Lucas and Kanade 1981, with cubic splines between pixels). The strip in the middle of the sensor that
+    receives light of both halves is ignored.
 
     Args:
-        image: as the camera captured it (not turned upright).
+        image: as the camera captured it (not upright).
         camera: one `vcc.Biprism` at rotation 0 and one `vcc.Lens` with a diameter, on the axis.
         distance_range: (nearest, farthest) before the entrance plane, metres; infinity is allowed.
         block: side of the blocks, pixels, an odd number.
-        step: from block to block, pixels; None takes half a block.
+        step: from block to block, pixels; None uses half a block.
 
     Raises:
-        InputError: a camera that is no such stereo camera, a picture of another size than its sensor's, turned
-            upright or with NaNs, a range that is none, or a picture that holds no block and its partner.
+        InputError: a camera that is not such a stereo camera, an image that is upright, has NaNs or does not
+            fit the sensor, an invalid range, or an image too small for a block and its partner.
 
     Warns:
-        ResultWarning: 1 % of the blocks or more match best at an end of the range.
+        ResultWarning: at least 1 % of the blocks match best at an end of the range.
     """
     stereo, lens = _parts(camera)
     values = _checked(image, camera)
@@ -146,7 +146,7 @@ def depth_by_biprism(
         raise InputError(f"block is an odd number of pixels, 5 or more, not {block}")
     step = max(1, block // 2) if step is None else step
     pitch = camera.sensor.pitches[1]
-    # One pixel further to either side, so that the best one has neighbours.
+    # One more pixel on either side, so that the best match has neighbours.
     lowest = math.floor(stereo.separation_of(near) / pitch) - 1
     highest = math.ceil(stereo.separation_of(far) / pitch) + 1
     rows, columns, half = _blocks(camera, stereo, lens, block, step, lowest)
@@ -210,10 +210,10 @@ def _checked(image: Image, camera: Camera) -> Array:
 
 
 def _mixed(stereo: BiprismStereo, lens: Lens) -> float:
-    """Half the width of the strip on the sensor that light of both halves reaches, metres.
+    """Half the width of the strip on the sensor that receives light of both halves, metres.
 
-    A ray from the sensor's x through the lens's p meets the biprism at p·(1 + a/d − a/f) − x·a/d: both signs of it
-    occur where |x| is less than what this returns.
+    A ray from x on the sensor through p on the lens meets the biprism at p·(1 + a/d − a/f) − x·a/d: both
+    signs occur if |x| is less than the result.
     """
     if lens.diameter is None:
         raise InputError(f"{lens.label} has no diameter: then light of both halves of the biprism is everywhere")
@@ -224,7 +224,7 @@ def _mixed(stereo: BiprismStereo, lens: Lens) -> float:
 def _blocks(
     camera: Camera, stereo: BiprismStereo, lens: Lens, block: int, step: int, lowest: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """Middles of blocks that lie in the right half picture with a partner that may lie in the left one."""
+    """Centres of blocks in the right half of the image whose partner can be in the left half."""
     half = block // 2
     places = camera.sensor.column_places
     pitch = camera.sensor.pitches[1]
@@ -252,7 +252,7 @@ def _correlations(
     mixed: float,
     camera: Camera,
 ) -> Array:
-    """Normalised correlation of each block with its partner at each separation; −∞ where there is none."""
+    """Normalised correlation of each block with its partner at each separation; −∞ if there is no partner."""
     windows = np.lib.stride_tricks.sliding_window_view(values, (2 * half + 1, 2 * half + 1))
     floor = (_FLOOR * values.max()) ** 2
     own = _standard(windows[np.ix_(rows - half, columns - half)], floor)
@@ -261,7 +261,7 @@ def _correlations(
     result = np.full((len(shifts), len(rows), len(columns)), -np.inf)
     for n, shift in enumerate(shifts):
         partner = columns - shift
-        # Room for cubic interpolation on the left; on the right is the other half.
+        # Space for cubic interpolation on the left; the other half is on the right.
         there = partner - half >= 2
         there &= places[np.clip(partner, 0, len(places) - 1)] < -(mixed + reach)
         if there.any():
@@ -271,7 +271,7 @@ def _correlations(
 
 
 def _distinct(correlation: Array) -> Array:
-    """0 where another separation matches as well as the best one (repeated patterns), to 1 where none does."""
+    """0 if another separation matches as well as the best one (repeated patterns), up to 1 if none does."""
     padded = np.pad(correlation, ((1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
     peaks = (correlation >= padded[:-2]) & (correlation >= padded[2:]) & np.isfinite(correlation)
     heights = np.sort(np.where(peaks, correlation, 0.0), axis=0)
@@ -280,7 +280,7 @@ def _distinct(correlation: Array) -> Array:
 
 
 def _standard(blocks: Array, floor: float) -> Array:
-    """Blocks less their mean, of norm 1 where they have texture and less where they have none."""
+    """Blocks minus their mean, with norm 1 if textured and less without texture."""
     centred = blocks - blocks.mean(axis=(2, 3), keepdims=True)
     return np.asarray(centred / np.sqrt((centred**2).sum(axis=(2, 3), keepdims=True) + floor * centred[0, 0].size))
 
@@ -288,7 +288,7 @@ def _standard(blocks: Array, floor: float) -> Array:
 def _refined(
     values: Array, rows: NDArray[np.intp], columns: NDArray[np.intp], separation: Array, half: int
 ) -> tuple[Array, Array]:
-    """Separations to a fraction of a pixel, and how much of the blocks they explain."""
+    """Separations to a fraction of a pixel, and the share of the blocks that they explain."""
     from scipy.ndimage import map_coordinates, spline_filter
 
     window = np.arange(-half, half + 1)

@@ -1,4 +1,4 @@
-"""Where micro-images are, found in a recording of something evenly white (Dansereau, Pizarro & Williams 2013)."""
+"""Find micro-images in a recording of a uniform white scene (Dansereau, Pizarro & Williams 2013)."""
 
 from __future__ import annotations
 
@@ -21,39 +21,39 @@ from vcc.shapes.lattice import Lattice
 Array = NDArray[np.float64]
 
 DARK_SHARE: Final = 0.05
-"""Pixels whose white image is below this share of its bright part are no evidence: noise, divided by little."""
+"""Pixels with a white image below this share of its bright part are invalid: noise divided by almost 0."""
 FEWEST_LENSLETS: Final = 6
-"""Across a white image, so that a lattice shows in its spectrum apart from the vignetting of the main lens."""
+"""Smallest number of lenslets across a white image, to separate the lattice in its spectrum from vignetting."""
 _NO_LATTICE = (
     f"the white image shows no lattice of micro-images: they must be {FEWEST_LENSLETS} or more across and 4 "
     "pixels or more apart, with darker lines between them (stop the main lens down until they part), or give "
     "the grid: LensletGrid.of_camera(camera), LensletGrid.from_centres(list)"
 )
 _A_PEAK = 30
-"""How many times the power around it a peak of a spectrum has, where one is looked for."""
+"""Smallest ratio of a spectral peak to the power around it."""
 _FITTED = 4000
-"""Lenslets that a lattice of six numbers is fitted to, at most."""
+"""Largest number of lenslets used to fit the lattice's six numbers."""
 
 
 def find_lenslets(
     white: Image | Recording | ArrayLike, *, dark: ArrayLike | None = None, color_filter: bool = False
 ) -> LensletGrid:
-    """The grid of micro-images in a recording of something evenly white.
+    """The grid of micro-images in a recording of a uniform white scene.
 
-    The two strongest peaks of its spectrum give the lattice, and their phases its place; then a lattice is fitted,
-    by least squares, to the centroids of micro-images, each in a window around the place where the lattice has it,
-    until nothing moves. The windows are symmetric and move with the fit: of micro-images that are symmetric
-    themselves the middles are found without bias, though neighbours touch.
+    The two strongest peaks of the spectrum give the lattice, and their phases its position. Then a lattice is
+    fitted by least squares to the centroids of micro-images, each in a window around its predicted position,
+    until it converges. The windows are symmetric and move with the fit: the centres of symmetric micro-images
+    are found without bias, even if neighbours touch.
 
     Args:
         white: numbers proportional to light, shape (rows, columns[, channels]).
-        dark: a recording without light, subtracted, shape of ``white``.
-        color_filter: whether pixels of an array stand behind a mosaic of filters, which is then evened out.
+        dark: a recording without light, subtracted, in the shape of ``white``.
+        color_filter: whether an array is a mosaic behind a colour filter, which is then smoothed.
 
     Raises:
-        InputError: a white image that is dark or shows no lattice of 6 lenslets or more across, 4 pixels or more
-            apart (they are too few, or touch without a dark line between them: stop the main lens down), or that
-            holds numbers that are not finite.
+        InputError: a white image that is dark, has values that are not finite, or shows no lattice of at least 6
+            lenslets across, at least 4 pixels apart (too few, or touching without a dark line between them:
+            stop the main lens down).
     """
     light = grey(numbers_of(white, "the white image"))
     if dark is not None:
@@ -65,12 +65,12 @@ def find_lenslets(
 
 
 def numbers_like(picture: Any, recording: Array, what: str) -> Array:
-    """The numbers of a picture from the sensor that made a recording, grey where the recording is.
+    """The values of an image from the sensor of a recording, grey if the recording is grey.
 
-    Of a grey picture and a recording in colour, they have one channel for all.
+    A grey image for a colour recording has a single channel.
 
     Raises:
-        InputError: another size, other channels, or what `numbers_of` refuses.
+        InputError: a wrong size, wrong channels, or an error of `numbers_of`.
     """
     values = numbers_of(picture, what)
     if values.shape[:2] != recording.shape[:2]:
@@ -93,11 +93,11 @@ def brightness_of(white: Any, light: Array) -> float:
     """The bright level of a white image.
 
     Args:
-        white: as it was given: its type tells full scale.
-        light: its numbers, without the dark frame's.
+        white: as given: its data type determines full scale.
+        light: its values, minus the dark frame.
 
     Raises:
-        InputError: there is no light.
+        InputError: the image is dark.
     """
     bright = float(np.quantile(light, 0.99))
     kind = getattr(white, "dtype", None)
@@ -112,7 +112,7 @@ def brightness_of(white: Any, light: Array) -> float:
 
 
 def evened_out(light: Array) -> Array:
-    """What filters of 2×2 pixels do to grey light, averaged away, symmetrically so that nothing moves."""
+    """Smooth the pattern of 2×2 filters in grey light, symmetrically so that nothing moves."""
     for axis in (0, 1):
         padded = np.pad(light, [(1, 1) if n == axis else (0, 0) for n in (0, 1)], mode="reflect")
         low, middle, high = (np.take(padded, np.arange(n, n + light.shape[axis]), axis) for n in (0, 1, 2))
@@ -120,17 +120,17 @@ def evened_out(light: Array) -> Array:
     return light
 
 
-# --- a first lattice, from the spectrum ---
+# --- initial lattice from the spectrum ---
 
 
 @dataclass(frozen=True, eq=False)
 class _Power:
-    """The power spectrum of a white image, as `numpy.fft.rfft2` orders it.
+    """The power spectrum of a white image, in the order of `numpy.fft.rfft2`.
 
     Args:
         values: |F|², shape (rows, columns // 2 + 1).
-        fx: frequencies along its columns, cycles a pixel, shape (1, columns // 2 + 1).
-        fy: along its rows, shape (rows, 1).
+        fx: frequencies along its columns, cycles per pixel, shape (1, columns // 2 + 1).
+        fy: frequencies along its rows, shape (rows, 1).
     """
 
     values: Array
@@ -147,7 +147,7 @@ class _Power:
         return cls(np.abs(rfft2(shown, s=shape)) ** 2, fx, fy)
 
     def peak(self, where: Any) -> tuple[Array, float]:
-        """(fx, fy) of the largest power, between bins by a parabola through its logarithm, and that power."""
+        """(fx, fy) of the largest power, interpolated by a parabola through its logarithm, and that power."""
         row, column = np.unravel_index(np.argmax(np.where(where, self.values, -1.0)), self.values.shape)
         found = np.array([self.fx[0, column], self.fy[row, 0]])
         if 0 < column < self.values.shape[1] - 1:
@@ -157,16 +157,15 @@ class _Power:
         return found, float(self.values[row, column])
 
     def prominence(self, frequency: Array, strongest: float) -> float:
-        """The largest power within a bin of a frequency, over the median of the ring of bins around it.
+        """The largest power within a bin of a frequency, divided by the median of the ring of bins around it.
 
-        What has less than 1/1000 of the strongest peak's power is leakage of the window, where a picture has no
-        noise.
+        In an image without noise, power below 1/1000 of the strongest peak is leakage of the window.
         """
         x, y = frequency if frequency[0] >= 0 else -frequency
         height, width = self.values.shape
         row, column = round(y * height), round(x * 2 * (width - 1))
         away = np.arange(-12, 13)
-        # Beyond the axis a half spectrum goes on as the conjugate of the other side.
+        # Beyond the axis, the half spectrum continues with the conjugate of the other side.
         rows, columns = row + away[:, None], column + away[None, :]
         rows, columns = np.where(columns < 0, -rows, rows) % height, np.abs(columns)
         patch = self.values[rows, np.minimum(columns, width - 1)]
@@ -182,7 +181,7 @@ def _vertex(three: Array) -> float:
 
 
 def _from_spectrum(light: Array) -> LensletGrid:
-    """The grid that peaks of the spectrum and their phases show."""
+    """The grid given by the peaks of the spectrum and their phases."""
     if min(light.shape) < 4 * FEWEST_LENSLETS:
         raise InputError(_NO_LATTICE)
     window = np.hanning(light.shape[0])[:, None] * np.hanning(light.shape[1])
@@ -191,9 +190,9 @@ def _from_spectrum(light: Array) -> LensletGrid:
     rows, columns = light.shape
     down, across = -2j * np.pi * np.arange(rows), -2j * np.pi * np.arange(columns)
     phases = [np.angle(np.exp(f[1] * down) @ shown @ np.exp(f[0] * across)) for f in frequencies]
-    # A lattice that stands at o has its peaks turned by −2π f·o, where micro-images are bright in their middles.
+    # A lattice with origin o has peaks with phases −2π f·o, if micro-images are bright at their centres.
     origin = np.linalg.solve(frequencies, -np.array(phases) / (2 * np.pi))
-    # Steps e and frequencies f are each other's reciprocals: e·f is 1 for one of the f and 0 for the other.
+    # Steps e and frequencies f are reciprocal: e·f is 1 for one of the f and 0 for the other.
     layout, steps = _reduced(np.asarray(np.linalg.inv(frequencies).T, np.float64))
     grid = grid_of(layout, Affine.from_parts(steps.T, origin))
     middle = grid.nearest_to(((columns - 1) / 2, (rows - 1) / 2))
@@ -205,11 +204,12 @@ def _moved_to(grid: LensletGrid, origin: Array) -> LensletGrid:
 
 
 def _frequencies(shown: Array) -> Array:
-    """Two frequencies (fx, fy) that all peaks of a picture's spectrum are sums of, cycles a pixel: (2, 2)."""
+    """Two frequencies (fx, fy) that generate all peaks of an image's spectrum, cycles per pixel: (2, 2)."""
     power = _Power.of(shown)
     radius = np.hypot(power.fx, power.fy)
     lowest = (FEWEST_LENSLETS - 1.5) / np.array(shown.shape)
-    # An ellipse around the spectrum of the vignetting; what is beyond 0.3 cycles a pixel belongs to finer things.
+    # An ellipse excludes the spectrum of the vignetting; frequencies above 0.3 cycles per pixel are finer
+    # structure.
     free = ((power.fx / lowest[1]) ** 2 + (power.fy / lowest[0]) ** 2 > 1) & (radius < 0.3)
     level = float(np.median(power.values[free]))
     first, strongest = power.peak(free)
@@ -225,10 +225,10 @@ def _frequencies(shown: Array) -> Array:
 
 
 def _fundamental(frequencies: Array, power: _Power, strongest: float) -> Array:
-    """The lattice of frequencies that all peaks belong to.
+    """The lattice of frequencies that contains all peaks.
 
-    Round micro-images that touch have hardly any power in their fundamentals (discs of diameter D have none at
-    1.22/D): then the strongest peaks are overtones, and weaker ones stand between them.
+    Round micro-images that touch have almost no power at their fundamentals (discs of diameter D have none at
+    1.22/D). The strongest peaks are then harmonics, with weaker ones between them.
     """
     between = {
         "square": [((1, 1), (-1, 1), 2), ((1, 0), (0, 1), 2)],
@@ -243,7 +243,7 @@ def _fundamental(frequencies: Array, power: _Power, strongest: float) -> Array:
 
 
 def _reduced(steps: Array) -> tuple[str, Array]:
-    """Layout and steps in standard form: the first along the row nearest to x, the second 60° or 90° on."""
+    """Layout and steps in standard form: the first along the row nearest to x, the second at 60° or 90° to it."""
     neighbours = [a * steps[0] + b * steps[1] for a in range(-2, 3) for b in range(-2, 3) if (a, b) != (0, 0)]
     neighbours.sort(key=lambda vector: float(np.linalg.norm(vector)))
     shortest = float(np.linalg.norm(neighbours[0]))
@@ -260,7 +260,7 @@ def _reduced(steps: Array) -> tuple[str, Array]:
 
 
 def _brightest(light: Array, grid: LensletGrid, origin: Array) -> Array:
-    """Of the places that a lattice's overtones cannot tell apart, the one with the most light around it."""
+    """Among the positions that a lattice's harmonics cannot distinguish, the one with the most light around it."""
     shape = (light.shape[0], light.shape[1])
     places = [origin + np.array([a, b]) / 6 @ np.array(grid.steps) for a in range(6) for b in range(6)]
 
@@ -272,17 +272,17 @@ def _brightest(light: Array, grid: LensletGrid, origin: Array) -> Array:
 
     totals = [light_at(place) for place in places]
     best = int(np.argmax(totals))
-    # The phases' own place is exact: it is left only for one that is clearly brighter.
+    # The position from the phases is exact: use another one only if it is clearly brighter.
     return places[best] if totals[best] > 1.05 * totals[0] else origin
 
 
-# --- the lattice fitted to centroids ---
+# --- lattice fitted to centroids ---
 
 
 def _refined(light: Array, grid: LensletGrid) -> LensletGrid:
-    """The grid fitted to centroids, first near the middle, then further out."""
+    """The grid fitted to centroids, first near the centre, then farther out."""
     shape = (light.shape[0], light.shape[1])
-    light = np.maximum(light - np.quantile(light, 0.01), 0.0)  # an even pedestal only slows the iteration
+    light = np.maximum(light - np.quantile(light, 0.01), 0.0)  # a constant offset would slow the iteration
     margin = 0.5 * grid.pitch + 1
     middle = np.array([(shape[1] - 1) / 2, (shape[0] - 1) / 2])
     radius, reach = 4 * grid.pitch, float(np.hypot(*shape)) / 2
@@ -306,22 +306,22 @@ def _refined(light: Array, grid: LensletGrid) -> LensletGrid:
 
 
 def _fitted_once(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> LensletGrid:
-    """The grid fitted to the centroids of micro-images around where it has them itself."""
+    """The grid fitted to the centroids of micro-images around its own positions."""
     places, mass = _centroids(light, grid.pixel_from_steps(index), grid.pitch / 2)
     bright = mass > 0.1 * np.quantile(mass, 0.9)
     if bright.sum() < 9:
         raise InputError("fewer than 9 micro-images of the white image are bright enough to be fitted")
     found = fitted(grid.layout, index[bright].astype(float), places[bright])
     off = np.linalg.norm(places - found.pixel_from_steps(index), axis=1)
-    # Dust and dead pixels: beyond three times what most are off by.
+    # Dust and dead pixels: more than three times the median error.
     kept = bright & (off <= max(3 * float(np.median(off[bright])), 1e-6))
     return fitted(grid.layout, index[kept].astype(float), places[kept]) if kept.sum() >= 9 else found
 
 
 def _evenly_lit(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> Array:
-    """Without vignetting, a polynomial of fourth order through the light of whole micro-images.
+    """The image without vignetting, divided by a fourth-order polynomial fitted to the light of micro-images.
 
-    Vignetting pulls centroids to its brighter side, and more so where micro-images touch.
+    Vignetting biases centroids towards its brighter side, more so if micro-images touch.
     """
     order = 4 if len(index) >= 60 else 2
     rows, columns = light.shape
@@ -335,12 +335,12 @@ def _evenly_lit(light: Array, grid: LensletGrid, index: NDArray[np.int64]) -> Ar
     coefficients[low] = np.linalg.lstsq(design, mass, rcond=None)[0]
     across, down = (np.arange(columns) - middle[0]) / middle[0], (np.arange(rows) - middle[1]) / middle[1]
     shading = polygrid2d(across, down, coefficients).T / mass.max()
-    # Where hardly any light comes through, a fit to it must not blow it up.
+    # Limited where there is hardly any light.
     return np.asarray(light / np.maximum(shading, DARK_SHARE))
 
 
 def _centroids(light: Array, centres: Array, radius: float) -> tuple[Array, Array]:
-    """Centroids (n, 2) in round windows around centres, with soft rims of a pixel, and the light in each."""
+    """Centroids (n, 2) in round windows around centres, with soft edges of one pixel, and the light in each."""
     reach = math.ceil(radius) + 1
     offset = np.arange(-reach, reach + 1)
     nearest = np.rint(centres).astype(int)

@@ -1,1 +1,1 @@
-"""The driver: plans run by engines, in memory or block by block, and what is made of light fields that way."""
+"""The driver: engines run plans, in memory or block by block; exposure, demosaicing and linear operators."""

@@ -1,8 +1,9 @@
-"""The driver backwards: from weights of a picture to the samples and the numbers that made it.
+"""The driver backwards: gradients with respect to the samples and the parameters of a plan.
 
-A picture is after ∘ core ∘ before of the samples. For weights G of it, this gives the derivative of ⟨G, picture⟩
-to the samples (the adjoint of the plan, applied to G) and to any of `Plan.parameters`, through the same blocks by
-which `vcc.run.drive` makes the picture. A block that runs with a border of dark views keeps its own.
+An image is after ∘ core ∘ before, applied to the samples. For weights G of the image, this module computes the
+gradient of ⟨G, image⟩ with respect to the samples (the adjoint of the plan, applied to G) and to any of
+`Plan.parameters`. It uses the same blocks as `vcc.run.drive`. A block that runs with a border of dark views
+keeps its own border.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from vcc.run.serialization import PortableRun
 Array = NDArray[np.float64]
 
 AHEAD = 4
-"""Pieces that others make for each of their places before those that are there are taken."""
+"""Blocks submitted per worker before their results are consumed."""
 
 
 def back(
@@ -49,26 +50,26 @@ def back(
     found: Partial | None = None,
     progress: Progress | None = None,
 ) -> Gradient:
-    """The derivative of ⟨weights, picture⟩ to the samples and to numbers of the plan.
+    """The gradient of ⟨weights, image⟩ with respect to the samples and to parameters of the plan.
 
     Args:
         plan: made for the samples' grid.
-        samples: of which the picture is made. They are looked at only where numbers are wanted.
-        picture_weights: one for each value of the picture, (rows, columns[, channels]).
+        samples: the samples of the image. They are read only if gradients of parameters are wanted.
+        picture_weights: one for each value of the image, (rows, columns[, channels]).
         how: engine, threads and memory.
         samples_wanted: whether the derivative to the samples is wanted.
         wanted: names of `Plan.parameters`.
-        found: the raster that `Drive.rounds` gave for these samples, where it is at hand: derivatives to numbers
-            of what is done after the core need it, and it is made where it is not given.
+        found: the raster that `Drive.rounds` returned for these samples, if available. Gradients of parameters
+            of operators after the core need it; without it, it is computed.
         progress: called with (done, total).
 
     Returns:
-        The derivative to the samples, of their shape, for each of their numbers as they are given (of integers a
-        step of one), float32 (float64 by ``reference``); and those to the numbers, float64.
+        The gradient with respect to the samples, in their shape and per unit of their values as given (for
+        integers per step of 1), float32 (float64 with ``reference``); gradients of the parameters, float64.
 
     Raises:
-        InputError: weights of another shape or not finite; a name that the plan does not have; what cannot be gone
-            through backwards (`Backwards`); a derivative to stored samples that is larger than the memory limit.
+        InputError: weights of a wrong shape or not finite; a name that the plan does not have; a plan or engine
+            without derivatives (`Backwards`); a gradient of stored samples that exceeds the memory limit.
     """
     return Backwards(Drive.of_linear(plan, samples, how or How()), wanted).gradient(
         picture_weights, samples_wanted=samples_wanted, found=found, progress=progress
@@ -76,10 +77,10 @@ def back(
 
 
 class Backwards:
-    """A plan on its way back through an engine.
+    """The reverse pass of a plan through an engine.
 
     Args:
-        drive: the plan on its way ahead, of a fixed number of rays (`Drive.of_linear`).
+        drive: the forward pass, with a fixed number of rays (`Drive.of_linear`).
         wanted: names of `Plan.parameters`.
 
     Raises:
@@ -88,7 +89,7 @@ class Backwards:
 
     def __init__(self, drive: Drive, wanted: Collection[str] = ()) -> None:
         self.plan = drive.plan
-        # Closed taps of views, too, would add to the picture if they were opened: their views are looked at.
+        # Closed taps contribute to the gradient of the weights as well: their views are read.
         self.opened = self.plan
         if "core.weights" in wanted:
             self.opened = self.plan.with_parameters(
@@ -116,7 +117,7 @@ class Backwards:
         found: Partial | None = None,
         progress: Progress | None = None,
     ) -> Gradient:
-        """The derivative as a whole; see `back`."""
+        """The complete gradient; see `back`."""
         into = self._room() if samples_wanted else None
         raster, numbers = self._after(picture_weights, found)
         total = Gradient(None, numbers)
@@ -133,25 +134,25 @@ class Backwards:
     def pieces(
         self, picture_weights: ArrayLike, progress: Progress | None = None
     ) -> Iterator[tuple[Block, NDArray[Any]]]:
-        """The derivative to the samples in pieces that need not be in memory together.
+        """The gradient with respect to the samples, in pieces that need not be in memory together.
 
         Args:
             picture_weights: see `back`.
             progress: called with (done, total).
 
         Yields:
-            Blocks of whole views and the derivative to their samples. Views that are in none of them are not
-            looked at: it is 0 there.
+            Blocks of whole views and the gradient of their samples. Views that are in no block are not used: their
+            gradient is 0.
         """
         raster, _ = self._after(picture_weights, None)
         parts = self._parts(raster, True, progress)
         for _, of_views in groupby(parts, key=lambda piece: (piece[0].rows, piece[0].columns)):
             yield self._gathered(of_views)
 
-    # --- what is done after the core ---
+    # --- operators after the core ---
 
     def _after(self, picture_weights: ArrayLike, found: Partial | None) -> tuple[Array, dict[str, Array]]:
-        """Weights of the raster, and derivatives to numbers of what is done to it."""
+        """Weights of the raster, and gradients of the parameters of the operators after the core."""
         weights = self._checked(picture_weights)
         rasters: list[Any] = []
         numbers: dict[str, Array] = {}
@@ -167,7 +168,7 @@ class Backwards:
         return weights, numbers
 
     def _checked(self, picture_weights: ArrayLike) -> Array:
-        """Weights (rows, columns, channels) of a picture, in double precision."""
+        """Weights (rows, columns, channels) of an image, in double precision."""
         weights = np.asarray(picture_weights, dtype=np.float64)
         channels = self.drive.samples.grid.shape[4:]
         if weights.shape != (shape := (*self.plan.sensor_shape, *channels)):
@@ -181,26 +182,26 @@ class Backwards:
 
     @property
     def _reads(self) -> bool:
-        """Whether samples have to be looked at: the picture is linear in them, but not in the numbers."""
+        """Whether samples must be read: the image is linear in the samples, but not in the parameters."""
         return bool(self.of_core or self.of_before)
 
     @property
     def _kind(self) -> np.dtype[Any]:
-        """Of derivatives to samples."""
+        """Data type of the gradient with respect to the samples."""
         return np.dtype(np.float64 if self.drive.able.double else np.float32)
 
     @property
     @cached
     def _blocks(self) -> list[Block]:
-        """The blocks of which any view is looked at."""
+        """The blocks with at least one used view."""
         blocks = self.drive.blocks if self.drive.in_memory else self._cut()
         return [block for block in blocks if self.drive.used_in(block)]
 
     def _cut(self) -> Blocks:
-        """Blocks of stored samples: with each, the derivative to it is in memory, and to what is made of it."""
+        """Blocks of stored samples that leave memory for a block's gradient and its intermediate arrays."""
         drive = self.drive
         need = drive.need
-        kept = self.plan.kept_as(drive.samples.grid.kind)[0]  # of which a view's bytes are counted
+        kept = self.plan.kept_as(drive.samples.grid.kind)[0]  # the type in which `need` counts a view's bytes
         each = self._kind.itemsize / kept.itemsize
         times = (need.times if self._reads else 0.0) + each * (3 if self.plan.before else 1)
         fixed = need.fixed + 8 * math.prod(self.plan.core.raster_shape) * drive.channels
@@ -208,7 +209,7 @@ class Backwards:
         return cut_evenly(used, drive.samples.grid, replace(need, fixed=fixed, times=times, bands=1), drive.limit)
 
     def _room(self) -> NDArray[Any] | None:
-        """Where the derivative to samples is gathered; None where it comes as a whole."""
+        """The array that accumulates the gradient of the samples; None if a single block returns it whole."""
         shape = self.drive.samples.grid.shape
         if self.drive.in_memory and len(self._blocks) == 1:
             return None
@@ -223,7 +224,7 @@ class Backwards:
         return np.zeros(shape, self._kind)
 
     def _parts(self, raster: Array, samples: bool, progress: Progress | None) -> Iterator[tuple[Block, Gradient]]:
-        """What each block says; those of a view's rows of pixels overlap by what is looked at beside them."""
+        """Each block and its gradient. Blocks that split a view overlap by the reach of the operators."""
         drive, blocks = self.drive, self._blocks
         if drive.in_memory and len(blocks) == 1:
             values = drive.prepared if self.of_core else None
@@ -240,7 +241,7 @@ class Backwards:
                 counted.add(drive.used_in(block))
 
     def _parts_by_others(self, raster: Array, counted: Counted) -> Iterator[tuple[Block, Gradient]]:
-        """What each block says of its samples, in order; no more are there at a time than `AHEAD` says."""
+        """Each block and its gradient, in order, computed by workers; `AHEAD` limits how many wait."""
         drive, blocks = self.drive, self._blocks
         assert drive.worker_pool is not None
         assert not self._reads, "others are asked about samples alone"
@@ -257,7 +258,7 @@ class Backwards:
             yield from (found.pop(number) for number in sorted(found))
 
     def begin(self) -> None:
-        """Go back to a row of pixels of a view, so that all code is compiled."""
+        """Run the reverse pass for one row of pixels of a view, to compile all code."""
         backwards, drive = copy(self), copy(self.drive)
         if self.plan.by_rays:
             drive.core = replace(drive.core, raster_shape=(1, 1))
@@ -266,11 +267,11 @@ class Backwards:
         backwards.part(replace(self._blocks[0], pixel_rows=(0, 1)), raster)
 
     def part(self, block: Block, raster: Array) -> tuple[Block, Gradient]:
-        """What weights of the raster say of a block's samples, and of which samples that is."""
+        """The gradient of a block's samples for weights of the raster, and the block that it covers."""
         return self._part(block, None, raster, True)
 
     def _gathered(self, parts: Iterator[tuple[Block, Gradient]]) -> tuple[Block, NDArray[Any]]:
-        """The parts of some views as one."""
+        """The parts of the same views, combined into one."""
         block, part = next(parts)
         rows = self.drive.samples.grid.shape[2]
         if block.pixel_rows == (0, rows):
@@ -280,12 +281,12 @@ class Backwards:
             whole[:, :, slice(*piece.pixel_rows)] += each.samples
         return replace(block, pixel_rows=(0, rows)), whole
 
-    # --- the core and what is done before it ---
+    # --- the core and the operators before it ---
 
     def _part(
         self, block: Block, values: Any, raster: Array, samples: bool, progress: Progress | None = None
     ) -> tuple[Block, Gradient]:
-        """What a block says, and of which samples."""
+        """A block's gradient, and the block that it covers."""
         drive, around = self.drive, self.drive.around(block)
         channels = drive.samples.grid.shape[4:]
         if values is None:
@@ -316,9 +317,9 @@ class Backwards:
         return block, replace(part, gradients={**numbers, **part.gradients})
 
     def _before(self, block: Block, weights: NDArray[Any], samples: bool) -> tuple[Block, Gradient]:
-        """What weights of a block's samples as the core takes them say of those that they are made of."""
+        """Apply the operators before the core in reverse, to the gradient of a block's samples at the core."""
         if self.drive.unit != 1:
-            weights /= self.drive.unit  # which an engine has made for nobody else
+            weights /= self.drive.unit  # in place: the array belongs to this call
         grown, beside = self.drive.with_reach(block)
         if any(beside):
             for view in np.ndindex(weights.shape[:2]):
@@ -341,10 +342,10 @@ class Backwards:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PortableBack(Brief):
-    """All that a block's way back needs but which block it is.
+    """All data that the reverse pass of a block needs, except the block itself.
 
     Args:
-        ahead: the plan, and the grid of samples that nobody looks at.
+        ahead: the plan, and the grid of the samples, which are not read.
         raster: weights of the raster, (rows, columns, channels).
     """
 
@@ -353,22 +354,22 @@ class PortableBack(Brief):
 
     @property
     def backwards(self) -> Backwards:
-        """The plan on its way back, here."""
+        """The reverse pass, rebuilt in this process."""
         return Backwards(Drive.of_linear(self.ahead.plan, self.ahead.samples, self.ahead.how))
 
 
 def _share_of(sent: PortableBack, block: Block) -> tuple[Block, Gradient]:
-    """What a block says, in another thread or process, or on another machine."""
+    """A block's gradient, computed in another thread or process, or on another machine."""
     return sent.backwards.part(block, sent.raster)
 
 
 def _begun(sent: PortableBack, _: None) -> None:
-    """What whoever goes back does first."""
+    """Compile all code before the first block."""
     sent.backwards.begin()
 
 
 def _parted(name: str) -> tuple[str, int, str]:
-    """Of ``"after[0].down"``: what of the plan it belongs to, which of these, and its name there."""
+    """Split ``"after[0].down"`` into the part of the plan, its index, and the parameter's name."""
     part, number, rest = re.fullmatch(r"(\w+)(?:\[(\d+)\])?\.(.+)", name).groups()  # type: ignore[union-attr]
     return part, int(number or 0), rest
 

@@ -1,7 +1,7 @@
-"""Several plans of one light field: which of them run together, and what they give.
+"""Several plans on one light field: which of them run together, and their results.
 
-Plans that look at the same samples are a *batch*: each block of samples is read once for all of them
-(`vcc.run.drive.over_blocks`), and an engine makes their rasters together (`vcc.plan.protocol.Engine.batch`).
+Plans that use the same samples form a *batch*: each block of samples is read once for all of them
+(`vcc.run.drive.over_blocks`), and an engine computes their rasters together (`vcc.plan.protocol.Engine.batch`).
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from vcc.run.drive import Drive, Recorded, made_of, over_blocks
 from vcc.run.required_samples import required_by_all
 
 COMING = 8
-"""Plans that come one after the other are run so many together for each thread, at most."""
+"""If plans arrive one at a time, at most this many per thread run together."""
 COMING_BYTES = 2**25
-"""Bytes of their rasters for each thread."""
+"""Limit of the total size of their rasters per thread, bytes."""
 
 
 def rasters_each(drives: Sequence[Drive]) -> list[Partial]:
-    """The rasters of several plans of one light field, which share what they can.
+    """The rasters of several plans on one light field; the plans share work if possible.
 
     Args:
-        drives: plans on their way through one engine, with the same samples.
+        drives: passes through one engine, with the same samples.
     """
     with Workers(drives[0].threads) as pool:
         return [raster for batch in _batches(drives) for raster in _made(batch, pool, lambda _, raster: raster)]
@@ -46,17 +46,17 @@ def rasters_each(drives: Sequence[Drive]) -> list[Partial]:
 def recorded_each(
     plans: Iterable[Plan], samples: Samples, how: How, output_buffers: OutputBuffers | None = None
 ) -> Iterator[tuple[Plan, Recorded]]:
-    """What `vcc.run.drive.drive` gives of several plans of one light field, in their order.
+    """The results of `vcc.run.drive.drive` for several plans on one light field, in order.
 
-    Of samples in memory plans are run as they come, some together. Nobody plans meanwhile: planning and running
-    that wait for Python's lock in turn take longer than one after the other. Of samples that are read all plans
+    If the samples are in memory, plans run as they arrive, some of them together. Planning and running do not
+    overlap: running both concurrently is slower because of the GIL. If the samples are read from disk, all plans
     are made first.
 
     Args:
-        plans: all that is done by one engine.
+        plans: all for the same engine.
         samples: as in `vcc.run.drive.drive`.
-        how: likewise.
-        output_buffers: where pictures of NumPy are put by the threads that make them.
+        how: as in `vcc.run.drive.drive`.
+        output_buffers: where the threads write NumPy images.
     """
     coming = samples.whole() is not None and not isinstance(plans, Sequence)
     if coming:
@@ -78,13 +78,13 @@ def recorded_each(
 def recorded_mixed(
     mixture: Mixture, samples: Samples, how: How, output_buffers: OutputBuffers | None = None
 ) -> Iterator[Recorded]:
-    """What `vcc.run.drive.drive` gives of several cameras whose pictures are sums of a few.
+    """The results of `vcc.run.drive.drive` for several cameras whose images are sums of a few basis images.
 
     Args:
-        mixture: how.
+        mixture: the plans of the basis images, and their coefficients.
         samples: as in `vcc.run.drive.drive`.
-        how: likewise.
-        output_buffers: where pictures are made.
+        how: as in `vcc.run.drive.drive`.
+        output_buffers: where images are written.
     """
     few = [recorded.values for _, recorded in recorded_each(mixture.plans, samples, how)]
     mixer = lazy_import.module("vcc.engines.mixed").Mixer(mixture, few, how.workers, output_buffers)
@@ -93,16 +93,16 @@ def recorded_mixed(
 
 
 def may_be_mixed(samples: Samples, how: How) -> bool:
-    """Whether pictures of these samples may be made as sums of a few: in compiled loops, on NumPy arrays."""
+    """Whether images of these samples can be mixed from a few: only by compiled loops, on NumPy arrays."""
     return abilities(chosen(how.engine, samples.whole())).parallel
 
 
 def _batches(drives: Iterable[Drive], coming: bool = False) -> Iterator[list[Drive]]:
-    """Plans next to each other that run together; each by itself that shares nothing.
+    """Lists of consecutive plans that run together; a plan that shares no work is alone in its list.
 
     Args:
-        drives: plans on their way.
-        coming: whether they are made as they are asked for, so that not too many are to be waited for.
+        drives: passes of the plans.
+        coming: whether plans are made on demand; batches are then kept small to limit the delay.
     """
     batch: list[Drive] = []
     for drive in drives:
@@ -120,14 +120,14 @@ def _in_one_batch(one: Drive, other: Drive) -> bool:
 
 
 def _after(last: Drive, drive: Drive) -> Drive:
-    """A plan on its way, with the samples that the last one has prepared where its own are the same."""
+    """The pass ``drive``, with the prepared samples of ``last`` if both use the same."""
     if drive.in_memory and _in_one_batch(last, drive) and is_computed(last, "prepared"):
         preset(drive, prepared=last.prepared)
     return drive
 
 
 def _most(drive: Drive, coming: bool) -> float:
-    """How many plans like this one run together."""
+    """The largest number of plans like this one in a batch."""
     if not drive.in_memory:
         return drive.most_at_once
     if not coming:
@@ -137,11 +137,11 @@ def _most(drive: Drive, coming: bool) -> float:
 
 
 def _made(batch: Sequence[Drive], pool: Workers, then: Callable[[int, Partial], Any]) -> list[Any]:
-    """What follows from the raster of each plan of a batch.
+    """The results of ``then`` for the raster of each plan of a batch.
 
     Args:
         batch: plans that run together.
-        pool: whose threads work.
+        pool: the threads.
         then: called with the number of a plan in the batch and its raster, in any thread.
     """
     first = batch[0]
@@ -151,12 +151,12 @@ def _made(batch: Sequence[Drive], pool: Workers, then: Callable[[int, Partial], 
         rasters = over_blocks(batch)
         return list(pool.map(then, range(len(batch)), rasters))
     for drive in batch:
-        preset(drive, prepared=first.prepared)  # once for all, for the way back, too
+        preset(drive, prepared=first.prepared)  # shared, also with the reverse pass
     return made_of(first, [drive.core for drive in batch], first.prepared, pool, then)
 
 
 def _finishing(batch: Sequence[Drive], places: NDArray[np.float32] | None) -> Callable[[int, Partial], Recorded]:
-    """What makes the picture of a batch's raster, in its place where there is one; of several, by one thread."""
+    """A function that finishes a raster to an image, in its output buffer if any; one thread each in a batch."""
     alone = [copy(drive) for drive in batch]
     if len(batch) > 1:
         for drive in alone:

@@ -1,4 +1,4 @@
-"""How a light field that is not in memory is cut into blocks that fit."""
+"""Cut a light field that is not in memory into blocks that fit."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from vcc.plan.model import Plan
 from vcc.run.executors import TOGETHER
 
 SUMS = 3
-"""Sums of rasters that are there at a time: one for each eightfold number of blocks, 512 of them."""
+"""Partial sums in memory at a time: one per factor of 8 in the number of blocks, enough for 512 blocks."""
 SHARES = 64
-"""Blocks by footprints that there are for many to work on at once, at least where each is still worth it."""
+"""Smallest number of blocks with footprints, to keep many workers busy, if the blocks are not too small."""
 READING, VIEWS = 1 / 8, 3
-"""Share of the memory that views may take while several are read at once; and views that one is in memory as then:
-it is read, unpacked and converted before it has its place."""
+"""Share of the memory for views while several are read at once; and copies of each view during reading: it is
+read, unpacked and converted before it is stored in the block."""
 WORTH = 2**24
-"""Bytes of samples from which on a block of its own is worth what it costs to ask for."""
+"""Bytes of samples below which a separate block is not worth its overhead."""
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,13 @@ class Blocks:
     """How a light field is cut so that each block fits the memory.
 
     Args:
-        rows: the rows of views that are looked at: the first, and the row after the last.
-        columns: likewise.
+        rows: rows of views that are used: the first, and the one after the last.
+        columns: columns of views, likewise.
         pixel_rows: rows of pixels of a view.
         pixel_columns: columns of pixels of a view.
         rows_each: rows of views in a block.
-        columns_each: columns of views in a block; fewer than there are only where a row is too large.
-        pixel_rows_each: rows of pixels in a block; fewer than there are only where a view is too large.
+        columns_each: columns of views in a block; fewer than all only if a row of views does not fit.
+        pixel_rows_each: rows of pixels in a block; fewer than all only if a view does not fit.
     """
 
     rows: tuple[int, int]
@@ -51,13 +51,13 @@ class Blocks:
 
     @classmethod
     def one(cls, grid: Grid) -> Blocks:
-        """All of a light field at once."""
+        """The whole light field as one block."""
         nv, nu, nt, ns = grid.shape[:4]
         return cls((0, nv), (0, nu), nt, ns, nv, nu, nt)
 
     @classmethod
     def by_column(cls, grid: Grid) -> Blocks:
-        """A column of views at a time."""
+        """One block per column of views."""
         nv, nu, nt, ns = grid.shape[:4]
         return cls((0, nv), (0, nu), nt, ns, nv, 1, nt)
 
@@ -69,7 +69,7 @@ class Blocks:
 
     @property
     def words(self) -> str:
-        """How many blocks there are of what."""
+        """The number and the size of the blocks, as text."""
         count = sum(1 for _ in self)
         if self.pixel_rows_each < self.pixel_rows and (self.rows_each, self.columns_each) != (1, 1):
             return f"{count} blocks of up to {self.pixel_rows_each} rows of pixels of all views"
@@ -88,17 +88,17 @@ def _parts(first: int, stop: int, each: int) -> Iterator[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Need:
-    """What a block takes of memory.
+    """Memory that a block needs.
 
     Args:
-        fixed: bytes that are taken whatever the blocks are: sums, a block's raster, and what the engine needs.
-        view: bytes of a view as it is kept.
-        times: how many times a block's samples are in memory.
-        border: dark views along each axis of a block, those on both of its sides.
+        fixed: bytes independent of the block size: sums, a block's raster, and the engine's memory.
+        view: bytes of a view as stored in the block.
+        times: how many copies of a block's samples are in memory.
+        border: dark views along each axis of a block, both sides together.
         raster: bytes of a block's raster, in double precision.
         by_rays: whether all rays are traced for each block.
         readers: how many views are read at a time.
-        bands: into how many bands of rows of pixels the views may be cut so that most rays are traced for one.
+        bands: the largest number of bands of pixel rows for which most rays need only one band.
     """
 
     fixed: int
@@ -112,13 +112,13 @@ class Need:
 
     @classmethod
     def of(cls, plan: Plan, grid: Grid, engine_memory: int, copies: bool) -> Need:
-        """What a plan's blocks take.
+        """Memory that the blocks of a plan need.
 
         Args:
-            plan: whose parts run.
+            plan: the plan.
             grid: of the light field.
-            engine_memory: bytes that the engine states.
-            copies: whether the engine converts all that it is given, as those in NumPy do.
+            engine_memory: bytes that the engine reports.
+            copies: whether the engine converts its input, as NumPy engines do.
         """
         kept = plan.kept_as(grid.kind)[0].itemsize
         pixels = math.prod(plan.core.raster_shape) * (grid.channels or 1)
@@ -130,35 +130,35 @@ class Need:
         return cls((1 + SUMS) * raster + single + engine_memory, grown, times, border, raster, plan.by_rays)
 
     def with_sums(self) -> Need:
-        """With what whoever runs blocks for others keeps beside: the results of blocks that are to be summed."""
+        """With memory for block results that wait to be summed, as when an executor runs the blocks."""
         return replace(self, fixed=self.fixed + TOGETHER * self.raster)
 
     def with_readers(self, threads: int, limit: float) -> Need:
-        """With views read by several threads, as many as a limit of bytes has room for."""
+        """With several threads that read views, as many as fit a limit in bytes."""
         return replace(self, readers=max(min(threads, int(READING * limit / (VIEWS * self.view))), 1))
 
     @property
     def reading(self) -> float:
-        """Bytes that are taken while views are read."""
+        """Bytes needed while views are read."""
         return VIEWS * self.view * self.readers
 
     @property
     def least_for_views(self) -> int:
-        """Bytes within which blocks are whole views."""
+        """The smallest memory in bytes for blocks of whole views."""
         return math.ceil(self.fixed + 8 * self.view)
 
 
 def cut(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks:
-    """The largest blocks that keep to a memory limit.
+    """The largest blocks within a memory limit.
 
     Args:
-        used: which views are looked at, (v, u).
+        used: which views are used, (v, u).
         grid: of the light field.
-        need: what the blocks take.
+        need: memory of the blocks.
         limit: bytes.
 
     Raises:
-        InputError: a limit that a single row of pixels does not fit.
+        InputError: a limit that does not fit a single row of pixels.
     """
     _, _, nt, ns = grid.shape[:4]
     rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
@@ -186,17 +186,17 @@ def cut(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks
 
 
 def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks:
-    """Blocks to work on: those of `cut`, or by footprints smaller ones, so that many may have work at once.
+    """The blocks of `cut`; with footprints smaller ones, so that many workers can run at once.
 
-    How many work does not count: the same blocks are the same picture, byte for byte. By rays blocks are as large
-    as may be, since all rays are traced for each; or they are bands of rows of pixels of all views, where it is
-    known which rays look at them.
+    The blocks do not depend on the number of workers, so images are identical to the byte. With rays, blocks are
+    as large as possible, since each block traces all rays; or they are bands of pixel rows of all views, if it is
+    known which rays use each band.
 
     Args:
         used: as for `cut`.
         grid: as for `cut`.
         need: as for `cut`.
-        limit: bytes for each of them.
+        limit: bytes per block.
 
     Raises:
         InputError: as `cut`.
@@ -204,13 +204,13 @@ def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) ->
     if need.by_rays:
         return _in_bands(used, grid, need, limit) or cut(used, grid, need, limit)
     views = int(used.sum())
-    # What comes of a block, its raster, is to be little beside it.
+    # The raster, a block's result, should be small compared with its samples.
     each = max(views * need.view / SHARES, WORTH, 8.0 * need.raster, need.view)
     return cut(used, grid, need, min(limit, need.fixed + need.reading + need.times * each))
 
 
 def _in_bands(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks | None:
-    """Bands of rows of pixels of all views, as large as fit; None where all fit, or where too many are needed."""
+    """The largest bands of pixel rows of all views that fit; None if all views fit, or if too many are needed."""
     _, _, nt, ns = grid.shape[:4]
     rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
     high, wide = rows[1] - rows[0], columns[1] - columns[0]
@@ -224,6 +224,6 @@ def _in_bands(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> 
 
 
 def _span(used: Any) -> tuple[int, int]:
-    """The first of those that are used, and the one after the last."""
+    """The index of the first used entry, and the one after the last."""
     found = np.flatnonzero(used)
     return int(found[0]), int(found[-1]) + 1

@@ -1,4 +1,4 @@
-"""Filling in the channels that the filter before a pixel keeps out: demosaicing."""
+"""Demosaicing: interpolate the channels that a pixel's colour filter blocks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vcc.base.errors import InputError
 from vcc.optics.electronics import Electronics
 
 Demosaicing = Literal["menon", "malvar", "bilinear"]
-"""Ways to fill in the channels that a pixel's filter keeps out; see `vcc.Recording.demosaiced`."""
+"""Demosaicing methods; see `vcc.Recording.demosaiced`."""
 
 
 def demosaic(
@@ -24,15 +24,15 @@ def demosaic(
 
     Args:
         mosaic: linear irradiance, (rows, columns), in which grey light has one value in every channel.
-        electronics: whose colour filter it is.
+        electronics: with the colour filter.
         method: see `vcc.Recording.demosaiced`.
 
     Returns:
         (rows, columns, channels), float32.
 
     Raises:
-        InputError: an unknown method or one that the tile does not allow, a mosaic smaller than the tile, or a
-            package that is not installed.
+        InputError: an unknown method, a method that does not support the tile, a mosaic smaller than the tile, or
+            a missing package.
     """
     default = "menon" if electronics.is_bayer else "bilinear"
     chosen = checks.one_of("method of demosaicing", method or default, get_args(Demosaicing))
@@ -57,7 +57,7 @@ def _by_library(method: str, mosaic: NDArray[np.float32], tile: str | None) -> N
     needing = checks.package(
         f'demosaicing by "{method}"', "colour-demosaicing", "demosaic", 'method="bilinear" does without'
     )
-    # Importing it changes how NumPy prints arrays, and it takes a name from SciPy that SciPy warns of.
+    # The import changes NumPy's print options, and it uses a name that SciPy deprecates.
     with needing, np.printoptions(), warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         import colour_demosaicing
@@ -65,8 +65,8 @@ def _by_library(method: str, mosaic: NDArray[np.float32], tile: str | None) -> N
         "menon": colour_demosaicing.demosaicing_CFA_Bayer_Menon2007,
         "malvar": colour_demosaicing.demosaicing_CFA_Bayer_Malvar2004,
     }
-    # Beyond the border its Malvar repeats the last pixel, which has the wrong colour there. A mosaic mirrored at
-    # the middle of its last pixels goes on in the right ones; an even number of them keeps the tile in its place.
+    # Outside the border Malvar repeats the last pixel, which has the wrong colour. Reflecting the mosaic about its
+    # border pixels preserves the colours; an even border keeps the tile in phase.
     border = 4
     padded = np.pad(mosaic, border, mode="reflect")
     values: NDArray[Any] = functions[method](padded, tile)[border:-border, border:-border]
@@ -74,7 +74,7 @@ def _by_library(method: str, mosaic: NDArray[np.float32], tile: str | None) -> N
 
 
 def _bilinear(mosaic: NDArray[np.float32], electronics: Electronics) -> NDArray[np.float32]:
-    """Each channel from its own samples: kept where measured, else weighted by a tent that reaches all pixels."""
+    """Each channel from its own samples: measured values are kept, others are means weighted by a tent."""
     from scipy.ndimage import convolve1d
 
     def tent(values: NDArray[np.float32], reach: int) -> NDArray[np.float32]:
@@ -86,7 +86,7 @@ def _bilinear(mosaic: NDArray[np.float32], electronics: Electronics) -> NDArray[
 
     channels = electronics.filter_channels
     filled = np.empty((*mosaic.shape, channels), np.float32)
-    largest = max(len(electronics.tile), len(electronics.tile[0])) - 1  # within it, each filter is met
+    largest = max(len(electronics.tile), len(electronics.tile[0])) - 1  # a reach that includes each filter
     for channel in range(channels):
         here = np.zeros(mosaic.shape, np.float32)
         for place, behind in electronics.filters:
@@ -94,7 +94,7 @@ def _bilinear(mosaic: NDArray[np.float32], electronics: Electronics) -> NDArray[
                 here[place] = 1.0
         for reach in range(max(largest, 1) + 1):
             share = tent(here, reach)
-            # A tent's smallest weight is 1 / (reach + 1)²; what is below it is rounding.
+            # The smallest weight of a tent is 1 / (reach + 1)²; smaller values are rounding errors.
             if float(share.min()) > 0.5 / (reach + 1) ** 2:
                 break
         filled[..., channel] = np.where(here > 0, mosaic, tent(mosaic * here, reach) / share)

@@ -1,9 +1,9 @@
-"""The driver: a plan run by an engine on the samples of a light field, in memory or block by block.
+"""The driver: an engine runs a plan on the samples of a light field, in memory or block by block.
 
-A picture is linear in the samples, so it is the sum of the pictures of blocks: in memory there is one block, a
-store is a sum over blocks, a tolerance is a sum over rounds of rays. A ray looks at up to four neighbouring views:
-a block is then run with a border of dark views where it has neighbours, so that a ray between two blocks finds in
-each the share that is there, and each block meets the same rays.
+An image is linear in the samples, so it is the sum of the images of blocks: samples in memory are one block,
+stored samples are a sum over blocks, and a tolerance is a sum over rounds of rays. A ray uses up to four
+neighbouring views. Therefore a block runs with a border of dark views where it has neighbours: a ray between two
+blocks finds its share in each of them, and all blocks use the same rays.
 """
 
 from __future__ import annotations
@@ -40,27 +40,27 @@ from vcc.run.required_samples import required_samples
 from vcc.run.serialization import PortableRun, PortableSamples
 
 SHARED = 0.5
-"""Share of the memory that a block takes at which several plans look; the rest is for their sums."""
+"""Share of the memory for a block that several plans use; the rest is for their sums."""
 HELD = 0.25
-"""Share of the memory that views and maps, kept to be used again, may take where views in between are made."""
+"""Share of the memory for cached views and maps when intermediate views are interpolated."""
 IN_MEMORY = 2**28
-"""Bytes of denser views that are there at a time, of a light field in memory."""
+"""Bytes for interpolated views in memory at a time, if the light field is in memory."""
 MUCH_UNSEEN = 0.01
-"""Share of the samples between views that no view shows, from which on a warning says it."""
+"""Share of the samples between views that no view shows, above which a warning is given."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """A picture and what is known about it.
+    """An image and its statistics.
 
     Args:
-        values: irradiance (rows, columns[, channels]), float32; an array of the library of the samples with the
-            ``array_api`` engine, else of NumPy.
-        missing_rays: the share of the rays asked for that the light field does not hold.
-        missing_reason: in words.
+        values: irradiance (rows, columns[, channels]), float32; with the ``array_api`` engine an array of the
+            samples' library, otherwise of NumPy.
+        missing_rays: share of the required rays that are outside the light field.
+        missing_reason: as text.
         sampling_error: root mean square over the pixels, in units of the values; 0 for footprints.
-        rays: how many were traced; 0 for footprints.
-        samples: rays a pixel; 0 for footprints.
+        rays: how many rays were traced; 0 for footprints.
+        samples: rays per pixel; 0 for footprints.
     """
 
     values: Any
@@ -78,46 +78,46 @@ def drive(
     progress: Progress | None = None,
     executor: Any = None,
 ) -> Recorded:
-    """The picture that a plan makes of a light field.
+    """The image of a light field by a plan.
 
     Args:
-        plan: made for its grid, or for another of the same shape and frame.
-        samples: in memory, or read block by block (by rays once for each doubling that a tolerance asks for).
-        how: engine, threads, tolerance and memory; the rest is the plan's.
+        plan: made for this grid, or for another of the same shape and frame.
+        samples: in memory, or read block by block (with rays once per doubling that the tolerance requires).
+        how: engine, threads, tolerance and memory; the plan determines the rest.
         progress: called with (done, total).
-        executor: who runs the blocks (`vcc.run.executors.worker_pool`); None runs them here, one after the other.
+        executor: runs the blocks (`vcc.run.executors.worker_pool`); None runs them in this process, one at a time.
 
     Raises:
-        InputError: an engine that does not take these arrays; of samples that are read, views that are missing or
-            damaged, or a memory limit that is too small; what an executor does not take, or one that dies.
+        InputError: an engine that does not support these arrays; missing or damaged views in a store, or a memory
+            limit that is too small; samples that an executor does not support, or an executor that fails.
     """
     return Drive(*required_samples(plan, samples), how or How(), executor).recorded(progress)
 
 
 class Drive:
-    """A plan on its way through an engine.
+    """A pass of a plan through an engine.
 
     Args:
         plan: what is computed.
-        samples: of what.
-        how: by what, and within what.
-        executor: who runs the blocks, each with one thread unless ``how`` says how many; None runs them here.
+        samples: of the light field.
+        how: engine and limits.
+        executor: runs the blocks, each with one thread unless ``how`` sets more; None runs them in this process.
 
     Attributes:
-        worker_pool: runs the blocks; None runs them here.
+        worker_pool: runs the blocks; None runs them in this process.
         plan: as given.
         how: as given.
-        given: the samples that were given.
-        samples: those that the core looks at; others than given where views in between are made.
+        given: the samples as given.
+        samples: the samples that the core uses; not the given ones if intermediate views are interpolated.
         name: of the engine.
         engine: its module.
-        able: what it can do.
-        threads: how many work at once.
-        limit: bytes within which blocks are cut.
-        kind: of the samples as the core takes them.
-        unit: what one of their numbers stands for in those given.
-        radiance: what it stands for.
-        core: the plan's, for samples of these numbers.
+        able: its abilities.
+        threads: how many run at once.
+        limit: bytes per block.
+        kind: data type of the samples for the core.
+        unit: the value in the given samples that corresponds to 1 for the core.
+        radiance: the radiance that corresponds to 1 for the core.
+        core: the plan's core, scaled to these values.
 
     Raises:
         InputError: see `drive`.
@@ -148,11 +148,11 @@ class Drive:
 
     @classmethod
     def of_linear(cls, plan: Plan, samples: Samples, how: How, executor: Any = None) -> Drive:
-        """The same for a plan that is to be gone through backwards, too.
+        """A pass that can also run backwards.
 
         Raises:
-            InputError: rays until a tolerance is met, views in between by depth, or arrays of another library:
-                what these do is not one linear map of the samples that is known here.
+            InputError: a tolerance, intermediate views interpolated by depth, or an engine without derivatives:
+                the image is then not one linear map of the samples with a known transpose.
         """
         if how.tolerance is not None:
             raise InputError(
@@ -170,22 +170,22 @@ class Drive:
 
     @property
     def in_memory(self) -> bool:
-        """Whether all samples are there already."""
+        """Whether all samples are in memory."""
         return self.samples.whole() is not None
 
     @property
     def channels(self) -> int:
-        """How many there are, 1 without a channel axis."""
+        """The number of channels; 1 without a channel axis."""
         return self.samples.grid.channels or 1
 
     @property
     @cached
     def need(self) -> Need:
-        """What blocks take of memory."""
+        """Memory that blocks need."""
         threads = self.threads if self.worker_pool is None else self.portable.how.workers
         taken = self.engine.memory(self.plan.core, self.channels, threads)
         need = Need.of(self.plan, self.samples.grid, taken, self.able.copies)
-        if self.plan.views_between is None:  # views made in between keep what they are made of
+        if self.plan.views_between is None:  # interpolated views cache their sources
             need = need.with_readers(threads, self.limit)
         if isinstance(self.plan.core, Rays) and self.able.bands and not any(map(any, self.plan.halo)):
             need = replace(need, bands=self.plan.core.bands)
@@ -194,7 +194,7 @@ class Drive:
     @property
     @cached
     def portable(self) -> PortableRun:
-        """What goes to those that run the blocks elsewhere."""
+        """The data that is sent to workers that run the blocks."""
         assert isinstance(self.given, PortableSamples)
         how = replace(
             self.how,
@@ -218,7 +218,7 @@ class Drive:
         return Blocks.by_column(grid) if copied else Blocks.one(grid)
 
     def recorded(self, progress: Progress | None = None) -> Recorded:
-        """The picture, all rounds of rays and all blocks summed."""
+        """The image, summed over all rounds of rays and all blocks."""
         try:
             found = self.rounds(progress)
         except MemoryError:
@@ -232,11 +232,11 @@ class Drive:
 
     @property
     def is_one_block(self) -> bool:
-        """Whether all samples are there and go through one run, by rounds of a fixed number of rays."""
+        """Whether all samples are in memory and run as one block, with a fixed number of rays."""
         return self.in_memory and self.how.tolerance is None and len(list(self.blocks)) == 1
 
     def finished(self, found: Partial) -> Recorded:
-        """The picture of a raster, and what is known about it."""
+        """The image and the statistics of a raster."""
         picture = self.picture(found)
         if self.plan.views_between is not None:
             _warn_of_unseen(self.samples)
@@ -257,12 +257,12 @@ class Drive:
         )
 
     def picture(self, found: Partial) -> Any:
-        """The picture (rows, columns[, channels]) of a raster, in the engine's precision."""
+        """The image (rows, columns[, channels]) of a raster, in the engine's precision."""
         picture = self.engine.finished(self.plan.after, found.values, self.threads)
         return picture if self.samples.grid.channels is not None else picture[..., 0]
 
     def rounds(self, progress: Progress | None = None) -> Partial:
-        """The raster by as many rays as a tolerance asks for; each round takes as many again as there are."""
+        """The raster with as many rays as the tolerance requires; each round doubles the number of rays."""
         found = self.summed(self.blocks, progress=progress)
         tolerance = self.how.tolerance
         while tolerance is not None and sampling_error(found) > tolerance * abs(_mean(found.values)):
@@ -273,16 +273,16 @@ class Drive:
                     f"the most there are; {tolerance:g} was asked for"
                 )
                 break
-            # From the block of points beside those taken: together they are one larger even set.
+            # The next block of the point sequence: together with the rays before, it is one larger uniform set.
             found = found.with_rays(self.summed(self.blocks, found.samples, progress))
         return found
 
     def summed(self, blocks: Iterable[Block], beside: int = 0, progress: Progress | None = None) -> Partial:
-        """The raster of some blocks, one after the other.
+        """The raster of some blocks, run one after the other.
 
         Args:
             blocks: of the light field.
-            beside: 0, or rays a pixel that there are already: then as many others.
+            beside: 0, or the number of rays per pixel so far: the same number of new rays is then traced.
             progress: called with (done, total).
         """
         listed = list(blocks)
@@ -293,7 +293,7 @@ class Drive:
         return self._by_others(listed, beside, progress)
 
     def _with_rays(self, beside: int) -> Any:
-        """The core with so many rays beside those taken."""
+        """The core with ``beside`` new rays per pixel."""
         return self.core.more(beside) if beside else self.core
 
     def _run(self, core: Any, values: Any, beside: int, progress: Progress | None = None) -> Partial:
@@ -302,8 +302,8 @@ class Drive:
     @property
     @cached
     def taken(self) -> Any:
-        """What the core is run on where all samples are in memory: `prepared`, which others may have made already,
-        or what rays prepare where they look at it."""
+        """The input of the core if all samples are in memory: `prepared`, which may exist already, or the samples
+        that the engine prepares for this core's rays alone."""
         if self.plan.by_rays and not is_computed(self, "prepared"):
             whole = self.samples.whole()
             found = self.engine.prepared(self.plan.before, whole, self.threads, self.core)
@@ -315,20 +315,21 @@ class Drive:
     @property
     @cached
     def prepared(self) -> Any:
-        """All samples in memory as the core takes them, the same for each round of rays."""
+        """All samples in memory, prepared for the core; the same for each round of rays."""
         return self.engine.prepared(self.plan.before, self.samples.whole(), self.threads)
 
     @property
     @cached
     def used(self) -> NDArray[np.bool_]:
-        """Which views are looked at, (v, u)."""
+        """Which views are used, (v, u)."""
         return self.plan.used_views(self.samples.grid.shape)
 
     @property
     @cached
     def shared(self) -> Any:
-        """What plans that are run together have in common: which samples they look at, and what is done with these
-        before; None where that is another thing for each plan, or a matter of several rounds."""
+        """A key that is equal for plans that can run together: the samples and the operators before the core.
+
+        None if the plan cannot share (executor, tolerance, interpolated views, or several blocks in memory)."""
         if self.worker_pool is not None or self.how.tolerance is not None or self.plan.views_between:
             return None
         if self.in_memory:
@@ -338,14 +339,14 @@ class Drive:
 
     @property
     def most_at_once(self) -> int:
-        """How many such plans can look at the same blocks: for their sums there is half of the memory."""
+        """How many such plans can share the same blocks: their sums have half of the memory."""
         within = self.limit * (1 - SHARED)
         if within < self.need.least_for_views:
             return 1
         return max(int(within / ((1 + SUMS) * self.need.raster)) - self.threads, 1)
 
     def reading_for(self, drives: Sequence[Drive]) -> Drive:
-        """What reads blocks for several plans: all views that any of them looks at, within half of the memory."""
+        """The pass that reads blocks for several plans: all views that any plan uses, in half of the memory."""
         if len(drives) == 1:
             return self
         made = copy(self)
@@ -355,17 +356,17 @@ class Drive:
         return made
 
     def looking_as(self, plan: Plan) -> Drive:
-        """The same with all views read that another plan looks at."""
+        """A copy that also reads the views that another plan uses."""
         made = copy(self)
         preset(made, used=plan.used_views(self.samples.grid.shape))
         return made
 
     def used_in(self, block: Block) -> int:
-        """How many views of a block are looked at."""
+        """How many views of a block are used."""
         return int(self.used[slice(*block.rows), slice(*block.columns)].sum())
 
     def _by_others(self, blocks: list[Block], beside: int, progress: Progress | None) -> Partial:
-        """The sum of what blocks give that an executor's workers run."""
+        """The sum of the block results that an executor's workers compute."""
         assert self.worker_pool is not None
         used = list(filter(self.used_in, blocks))
         counted = Counted(progress, sum(map(self.used_in, used)))
@@ -377,18 +378,18 @@ class Drive:
         return _in_double(total.part)
 
     def part(self, block: Block, beside: int, counted: Counted) -> Partial:
-        """The raster of a block: the task of which the picture of what is not in memory is the sum.
+        """The raster of a block: one task of an executor, and one term of the sum over blocks.
 
         Args:
             block: of the light field.
             beside: see `summed`.
-            counted: told of each view that is read.
+            counted: counts each view that is read.
         """
         core = self._with_rays(beside).part(self.plan.block(self.around(block)))
         return self._run(core, self.values(block, counted), beside)
 
     def begin(self) -> None:
-        """Run a row of pixels of a view, so that all code is compiled."""
+        """Run one row of pixels of a view, to compile all code."""
         row, column = map(int, np.argwhere(self.used)[0])
         block = replace(
             Block.all_of(self.samples.grid.shape),
@@ -401,12 +402,12 @@ class Drive:
         self.engine.run(core.part(self.plan.block(self.around(block))), values, threads=self.threads)
 
     def around(self, block: Block) -> Block:
-        """What runs with a block: of those that are read, a border of views where it has neighbours, too."""
+        """A block with a border of views where it has neighbours; without the border if samples are in memory."""
         border = 0 if self.in_memory else self.plan.core.border
         return _with_border(block, border, self.samples.grid.shape)
 
     def values(self, block: Block, counted: Counted) -> Any:
-        """A block's samples as the core takes them, with a border of dark views towards its neighbours."""
+        """A block's samples, prepared for the core, with a border of dark views towards its neighbours."""
         if self.in_memory:
             counted.add(self.used_in(block))
             return self.engine.prepared(self.plan.before, self.samples.read(block), self.threads)
@@ -425,7 +426,7 @@ class Drive:
         return room
 
     def _room(self, shape: tuple[int, ...]) -> NDArray[Any]:
-        """Zeros for a block: where the last had the same shape in its memory, as new memory takes long."""
+        """Zeros for a block; reuses the last block's array if the shape is the same: allocation is slow."""
         if self._kept is None or self._kept.shape != shape:
             self._kept = None
             self._kept = np.zeros(shape, dtype=self.kind)
@@ -434,15 +435,15 @@ class Drive:
         return self._kept
 
     def with_reach(self, block: Block) -> tuple[Block, tuple[int, int]]:
-        """A block with the rows of pixels that operators before look at beside it; how many above and below."""
+        """A block with the pixel rows around it that operators before the core need; (rows above, below)."""
         first, stop = block.pixel_rows
         above, below = min(self.plan.reach, first), min(self.plan.reach, self.samples.grid.shape[2] - stop)
         return replace(block, pixel_rows=(first - above, stop + below)), (above, below)
 
     def _view(self, row: int, column: int, block: Block) -> Any:
-        """The samples of one view of a block, read with as many more rows of pixels as operators before reach."""
+        """The samples of one view of a block; the operators before the core also read rows around the block."""
         one, (above, below) = self.with_reach(replace(block, rows=(row, row + 1), columns=(column, column + 1)))
-        threads = self.threads if self.need.readers == 1 else 1  # others are at other views
+        threads = self.threads if self.need.readers == 1 else 1  # other threads read other views
         (top, _), (left, _), *beside = self.plan.halo
         view = self.engine.prepared(self.plan.before, self.samples.read(one), threads)[top, left]
         view = view[above : view.shape[0] - below]
@@ -450,7 +451,7 @@ class Drive:
         return view
 
     def _look_between(self, between: ViewsBetween) -> None:
-        """Look at the denser light field instead, whose views are made when they are read."""
+        """Replace the samples by the denser light field, whose views are interpolated when they are read."""
         whole = self.given.whole()
         if whole is not None and not isinstance(whole, np.ndarray):
             raise InputError(
@@ -462,8 +463,8 @@ class Drive:
             lazy_import.module("vcc.engines.depth_views").DenserViews, self.given, between, self.threads
         )
         if whole is not None:
-            # As few bytes as serve well, and as many as a block of one view takes.
-            self.samples = denser(held=0.0)  # of which only the grid is asked
+            # As little memory as is efficient, but enough for a block of one view.
+            self.samples = denser(held=0.0)  # only its grid is used
             self.limit = max(IN_MEMORY, math.ceil(self.need.least_for_views / (1 - HELD)))
         self.samples = denser(held=HELD * self.limit)
         self.limit = math.ceil(self.limit * (1 - HELD))
@@ -475,12 +476,12 @@ def over_blocks(
     beside: int = 0,
     progress: Progress | None = None,
 ) -> list[Partial]:
-    """The rasters of plans that look at the same blocks, each of which is read once: sums in double precision.
+    """The rasters of plans that share their blocks; each block is read once. Sums are in double precision.
 
     Args:
-        drives: plans with the same `Drive.shared`, or one. The first says how blocks are read.
-        blocks: of the light field; None for all. Those of which no view is looked at are not read.
-        beside: see `Drive.summed`; 0 for several.
+        drives: passes with the same `Drive.shared`, or a single one. The first determines how blocks are read.
+        blocks: of the light field; None for all. Blocks without used views are not read.
+        beside: see `Drive.summed`; 0 for several plans.
         progress: called with (done, total).
     """
     reader = drives[0].reading_for(drives)
@@ -505,14 +506,14 @@ def over_blocks(
 def made_of(
     drive: Drive, cores: Sequence[Core], values: Any, pool: Workers, then: Callable[[int, Partial], Any]
 ) -> list[Any]:
-    """What follows from the rasters of the same samples by several cores.
+    """The results of ``then`` for the rasters of several cores on the same samples.
 
     Args:
-        drive: by which engine.
+        drive: with the engine.
         cores: what is computed.
-        values: the samples as these take them.
-        pool: whose threads work.
-        then: called with the number of each and its raster.
+        values: the samples, prepared for the cores.
+        pool: the threads.
+        then: called with the index of each core and its raster.
     """
     if drive.able.parallel and len(cores) > 1:
         return drive.engine.batch(cores, values, pool=pool, then=then)
@@ -521,12 +522,12 @@ def made_of(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Share(Brief):
-    """What some blocks that others ran give.
+    """The result of blocks that a worker ran.
 
     Args:
         part: of the raster.
-        made: samples of views in between that were made for it.
-        unseen: of these, those that no view shows.
+        made: how many samples of intermediate views were interpolated for it.
+        unseen: how many of these are visible in no view.
     """
 
     part: Partial
@@ -535,14 +536,14 @@ class Share(Brief):
 
 
 def _share_of(sent: PortableRun, asked: tuple[Block, int]) -> Share:
-    """What a block gives, in another thread or process, or on another machine."""
+    """The result of a block, computed in another thread or process, or on another machine."""
     drive = Drive(sent.plan, sent.samples, sent.how)
     part = drive.part(*asked, Counted(None, 0))
     return Share(part, getattr(drive.samples, "made", 0), getattr(drive.samples, "unseen", 0))
 
 
 def warmed_up(sent: PortableRun, _: None) -> None:
-    """What whoever runs blocks does first."""
+    """Compile all code before the first block."""
     Drive(sent.plan, sent.samples, sent.how).begin()
 
 
@@ -551,12 +552,12 @@ def _sum_of_shares(one: Share, other: Share) -> Share:
 
 
 def _sum(one: Partial, other: Partial) -> Partial:
-    """What two blocks give together, in double precision."""
+    """The sum of the results of two blocks, in double precision."""
     return _in_double(one) + other
 
 
 def _with_border(block: Block, border: int, shape: tuple[int, ...]) -> Block:
-    """A block with so many views around it where it has neighbours in a light field of this shape."""
+    """A block with ``border`` more views on each side, as far as the light field has them."""
     (a, b), (c, d) = block.rows, block.columns
     return replace(
         block,
@@ -566,12 +567,12 @@ def _with_border(block: Block, border: int, shape: tuple[int, ...]) -> Block:
 
 
 def dark_of_neighbours(rows: Any, read: tuple[int, int], beside: tuple[int, int]) -> None:
-    """Put out the border of a block's rows of pixels where the block has neighbours, which hold these rows.
+    """Set the border of a block's pixel rows to 0 where the block has neighbours: they contain these rows.
 
     Args:
-        rows: of a view, with a border; written over.
-        read: rows (above, below) that were read of neighbours.
-        beside: rows (above, below) of the border.
+        rows: pixel rows of a view, with a border; modified in place.
+        read: number of rows (above, below) read from neighbours.
+        beside: number of rows (above, below) of the border.
     """
     if read[0] and beside[0]:
         rows[: beside[0]] = 0
@@ -580,7 +581,7 @@ def dark_of_neighbours(rows: Any, read: tuple[int, int], beside: tuple[int, int]
 
 
 def _in_double(part: Partial) -> Partial:
-    """Sums of many parts are kept in double precision."""
+    """A raster converted to double precision, for sums of many parts."""
     if not isinstance(part.values, np.ndarray):
         return part
     difference = None if part.difference is None else part.difference.astype(np.float64, copy=False)
@@ -588,20 +589,20 @@ def _in_double(part: Partial) -> Partial:
 
 
 class Counted:
-    """Views counted as they are read."""
+    """Counts views as they are read, and reports progress."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = progress, total, 0
 
     def add(self, views: int) -> None:
-        """So many more are done."""
+        """Count some more views."""
         self._done += views
         if self._progress is not None:
             self._progress(self._done, self._total)
 
 
 def _warn_of_unseen(views: Any) -> None:
-    """Say it if much of what lies between views is seen by none."""
+    """Warn if many of the samples between views are visible in no view."""
     if views.made and views.unseen > MUCH_UNSEEN * views.made:
         warn_of_result(
             f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
@@ -610,7 +611,7 @@ def _warn_of_unseen(views: Any) -> None:
 
 
 def sampling_error(found: Partial) -> float:
-    """The sampling error, root mean square over the pixels, by what the two halves of the rays differ."""
+    """The sampling error (root mean square over the pixels), from the difference of the two halves of the rays."""
     if found.difference is None:
         return 0.0
     return math.sqrt(_mean(found.difference * found.difference)) / 2

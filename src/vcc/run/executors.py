@@ -1,7 +1,7 @@
-"""Work that others run: threads, processes, clusters.
+"""Run tasks on an executor: threads, processes, clusters.
 
-A task is a function of ours, the data that all tasks share (packed once) and one item. `worker_pool` accepts
-any `concurrent.futures.Executor` or a Dask client and returns a pool with two methods: `WorkerPool.each`
+A task is a function of this package, the data that all tasks share (packed once) and one item. `worker_pool`
+accepts any `concurrent.futures.Executor` or a Dask client and returns a pool with two methods: `WorkerPool.each`
 yields results as they arrive, `WorkerPool.summed` returns their sum. The order of additions is one fixed tree
 (`Tree`), whichever task finishes first: sums have the same bytes in each run, on one machine or many.
 """
@@ -25,34 +25,34 @@ from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.version import VERSION
 
 Function = Callable[[Any, Any], Any]
-"""A function of a module, which other processes find by its name: of what is shared, and of an item."""
+"""A module-level function of the shared data and an item; other processes find it by name."""
 Add = Callable[[Any, Any], Any]
-"""A function of a module that adds two results."""
+"""A module-level function that adds two results."""
 
 TOGETHER = 8
-"""How many are added by one sum of a `Tree`."""
+"""How many parts each sum of a `Tree` adds."""
 RETRIES = 3
-"""How often a cluster does a task again that failed."""
+"""How often a cluster repeats a task that failed."""
 LOOK = 1.0
-"""Seconds after which somebody looks whether a pool that reports nothing still runs."""
+"""Seconds without results after which a pool is checked."""
 LEAST_ROOM = 2**26
-"""Bytes for a task without which nobody need begin."""
+"""The smallest memory in bytes with which a task can run."""
 SILENT = 60.0
-"""Seconds within which a scheduler answers that is asked whether it is there; one that is frozen never does."""
+"""Seconds within which a scheduler must answer; a frozen one never does."""
 TAKEN, LIBRARIES = 0.7, 4e8
-"""Of a Dask worker's memory, the share that it may take before it spills to disk; and bytes that Python, its
-libraries and compiled code take of that."""
+"""The share of a Dask worker's memory that can be used before the worker spills to disk; and the bytes of it that
+Python, its libraries and compiled code use."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Work:
-    """What is done with each item.
+    """The work that is done for each item.
 
     Args:
-        function: of a module; called with ``shared`` and an item.
-        shared: what can be pickled; sent once to each process of a cluster, with each task to those of a pool.
-        first: of a module; called with ``shared`` and None before anything else begins, once on each machine of a
-            cluster, and here for a pool: so that what has to be compiled is compiled once. None for nothing.
+        function: module-level; called with ``shared`` and an item.
+        shared: picklable; sent once to each process of a cluster, or with each task to a pool.
+        first: module-level; called with ``shared`` and None before all else, once on each machine of a cluster,
+            or in this process for a pool, so that code is compiled only once. None for nothing.
     """
 
     function: Function
@@ -61,42 +61,43 @@ class Work:
 
 
 class WorkerPool(Protocol):
-    """Runs the work. An executor given to `worker_pool` stays the caller's: nobody here shuts it down."""
+    """Runs the work. The caller keeps its executor: it is never shut down here."""
 
     @property
     def places(self) -> int:
-        """How many tasks run at once, as far as is known."""
+        """How many tasks run at once, if known."""
         ...
 
     @property
     def memory(self) -> float | None:
-        """Bytes of memory that each of these may take; None where nobody says."""
+        """Memory in bytes for each task; None if unknown."""
         ...
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """What a function gives for each item.
+        """The function's result for each item.
 
         Args:
-            work: what is to be done.
-            items: what can be pickled.
+            work: the work.
+            items: picklable.
 
         Yields:
-            (number of the item, result), as they come. Whoever ends this early, by an error or Ctrl-C, ends the
-            work: what has not begun does not begin.
+            (index of the item, result), as they arrive. Closing the generator early, by an error or Ctrl-C,
+            cancels the tasks that have not started.
 
         Raises:
-            InputError: the executor is shut down, or dies with its work not done; what tasks raise is raised here.
+            InputError: the executor is shut down, or fails before the work is done. Errors of tasks are
+                raised again.
         """
         ...
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """The sum of what a function gives for each item, by the tree of `Tree`.
+        """The sum of the function's results for all items, in the order of `Tree`.
 
         Args:
-            work: what is to be done.
-            items: what can be pickled; one at least.
-            add: of a module; adds two results.
-            told: called with the number of each item that is done.
+            work: the work.
+            items: picklable; at least one.
+            add: module-level; adds two results.
+            told: called with the index of each item that is done.
 
         Raises:
             InputError: as in `each`.
@@ -105,13 +106,13 @@ class WorkerPool(Protocol):
 
 
 def worker_pool(executor: Any) -> WorkerPool:
-    """Who does the work, by what a user gives.
+    """The worker pool of a user's executor.
 
     Args:
         executor: a `concurrent.futures.Executor`, or a ``dask.distributed.Client``.
 
     Raises:
-        InputError: neither of them, or a client that is closed or asynchronous.
+        InputError: another type, or a client that is closed or asynchronous.
     """
     if isinstance(executor, Executor):
         return Pool(executor)
@@ -124,14 +125,14 @@ def worker_pool(executor: Any) -> WorkerPool:
 
 
 def memory_of_task(asked: int | None, workers: WorkerPool | None) -> float:
-    """Bytes that one task may take, or what is run here.
+    """Memory in bytes for one task, or for work in this process.
 
     Args:
-        asked: by a user; None takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, or what workers have.
-        workers: who does it; None is here.
+        asked: by the user; None is a quarter of `vcc.base.memory.MEMORY_LIMIT`, or what the workers have.
+        workers: the pool; None for this process.
 
     Raises:
-        InputError: more than the workers have.
+        InputError: more than the workers have, or workers with too little memory.
     """
     memory = None if workers is None else workers.memory
     if memory is None:
@@ -151,7 +152,7 @@ def memory_of_task(asked: int | None, workers: WorkerPool | None) -> float:
 
 @dataclass(frozen=True, repr=False)
 class Parcel:
-    """What all tasks share, packed once.
+    """The data that all tasks share, packed once.
 
     Args:
         version: of the package that packed it.
@@ -163,10 +164,10 @@ class Parcel:
 
     @classmethod
     def of(cls, shared: Any) -> Parcel:
-        """Something packed.
+        """Pack an object.
 
         Raises:
-            InputError: it cannot be.
+            InputError: it cannot be pickled.
         """
         try:
             return cls(VERSION, pickle.dumps(shared, protocol=5))
@@ -174,10 +175,10 @@ class Parcel:
             raise InputError(f"this cannot be sent to other processes: {error}") from error
 
     def opened(self) -> Any:
-        """What was packed, unpacked anew: two threads never share it.
+        """The unpacked object, a new one each time: threads never share it.
 
         Raises:
-            InputError: another version of the package packed it.
+            InputError: it was packed by another version of the package.
         """
         if self.version != VERSION:
             raise InputError(
@@ -188,30 +189,31 @@ class Parcel:
 
 
 def perform(item: Any, parcel: Parcel) -> Any:
-    """One task: the parcel holds the function and what is shared."""
+    """Run one task; the parcel contains the function and the shared data."""
     function, shared = parcel.opened()
     return function(shared, item)
 
 
 def _kept(parcel: Parcel) -> Parcel:
-    """A parcel as the result of a task: where a cluster loses it with a worker, it is there again."""
+    """Return a parcel as a task's result, so that a cluster recomputes it if a worker is lost."""
     return parcel
 
 
 def _added(parcel: Parcel, parts: Sequence[Any]) -> Any:
-    """A sum of a `Tree`: the parcel holds what adds two."""
+    """A sum of a `Tree`; the parcel contains the function that adds two."""
     return reduce(parcel.opened(), parts)
 
 
 class Tree:
-    """The sum of things that come in any order, always taken in the same: eight neighbours, eight of their sums, …
+    """A sum of parts that arrive in any order, with a fixed order of additions: eight neighbours, eight such
+    sums, …
 
-    Each sum is taken from the left as far as its things are there, so that of those that come in order one is kept
-    for each level, ⌈log₈ n⌉ in all.
+    Each sum adds from the left as far as its parts have arrived. If parts arrive in order, one partial sum is kept
+    per level, ⌈log₈ n⌉ in all.
 
     Args:
-        leaves: how many things there are.
-        add: adds two.
+        leaves: the number of parts.
+        add: adds two parts.
     """
 
     def __init__(self, leaves: int, add: Add) -> None:
@@ -220,15 +222,15 @@ class Tree:
             self._counts.append(-(-self._counts[-1] // TOGETHER))
         self._open: dict[tuple[int, int], _Sum] = {}
         self.total: Any = None
-        """The sum, once all are there."""
+        """The sum, once all parts have arrived."""
 
     def put(self, number: int, thing: Any, level: int = 0) -> None:
-        """One of the things.
+        """Add one part.
 
         Args:
-            number: which, from 0 on.
-            thing: as `add` takes it.
-            level: 0; of sums, how many sums deep they are.
+            number: its index, from 0.
+            thing: the part, as `add` accepts it.
+            level: 0 for parts; n for sums at level n of the tree.
         """
         if self._counts[level] == 1:
             self.total = thing
@@ -248,7 +250,7 @@ class Tree:
 
 @dataclass
 class _Sum:
-    """A sum that is being taken: of those before ``next``; later ones wait."""
+    """A partial sum of the parts before ``next``; later parts wait in ``there``."""
 
     there: dict[int, Any]
     next: int = 0
@@ -256,7 +258,7 @@ class _Sum:
 
 
 def _finished(futures: Sequence[Any], alive: Callable[[], None]) -> Generator[int, None, None]:
-    """The numbers of futures as they finish; somebody looks now and then whether there is any hope."""
+    """Yield the indices of futures as they finish; call ``alive`` every `LOOK` seconds without a result."""
     done: SimpleQueue[int] = SimpleQueue()
     for number, future in enumerate(futures):
         future.add_done_callback(partial(_noted, done, number))
@@ -277,7 +279,7 @@ def _noted(done: SimpleQueue[int], number: int, _: Any) -> None:
 
 
 class Pool:
-    """Any `concurrent.futures.Executor`: threads, processes, and what speaks like them.
+    """Any `concurrent.futures.Executor`: threads, processes, and compatible classes.
 
     Args:
         executor: its ``submit`` is called.
@@ -290,7 +292,7 @@ class Pool:
 
     @property
     def places(self) -> int:
-        """As Python's own pools say it; 1 of others."""
+        """The number of workers of Python's own pools; 1 for other executors."""
         return int(getattr(self._executor, "_max_workers", 1))
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
@@ -302,7 +304,7 @@ class Pool:
             futures += [self._submit(parcel, item) for item in items]
             for number in _finished(futures, lambda: None):
                 result = self._result(futures[number])
-                futures[number] = None  # so that nobody keeps it
+                futures[number] = None  # frees the result
                 yield number, result
         finally:
             for future in futures:
@@ -310,7 +312,7 @@ class Pool:
                     future.cancel()
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `WorkerPool.summed`; what comes is added here."""
+        """See `WorkerPool.summed`; results are added in this process."""
         tree = Tree(len(items), add)
         with closing(self.each(work, items)) as results:
             for number, result in results:
@@ -346,11 +348,11 @@ class Pool:
 
 
 class Cluster:
-    """A client of Dask, taken as it is.
+    """A Dask client.
 
-    What all tasks share is a task's result itself, so that each worker fetches it once and none depends on the
-    worker that had it first. Sums are tasks that go before new items. A task of a worker that dies is done again
-    elsewhere.
+    The shared data is the result of a task, so that each worker fetches it once and no task depends on the worker
+    that had it first. Sums are tasks with priority over new items. Dask repeats the tasks of a lost worker on
+    another one.
 
     Args:
         client: a ``dask.distributed.Client``.
@@ -369,12 +371,12 @@ class Cluster:
 
     @property
     def places(self) -> int:
-        """Threads of all workers that are there now."""
+        """The threads of all current workers."""
         return sum(self._client.nthreads().values())
 
     @property
     def memory(self) -> float | None:
-        """What the least of the workers has for each of its threads, without spilling to disk."""
+        """The smallest memory per thread among the workers, without spilling to disk; None if unlimited."""
         workers = self._client.scheduler_info()["workers"].values()
         rooms = [
             (TAKEN * worker["memory_limit"] - LIBRARIES) / worker["nthreads"]
@@ -389,13 +391,13 @@ class Cluster:
         try:
             for number in _finished(futures, self._look):
                 result = self._result(futures[number])
-                futures[number] = None  # so that the cluster lets go of it
+                futures[number] = None  # lets the cluster free the result
                 yield number, result
         finally:
             self._cancel(futures)
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `WorkerPool.summed`; what comes is added where it is, and one sum comes here."""
+        """See `WorkerPool.summed`; the workers add the results, and only the sum is transferred."""
         futures = self._mapped(work, items)
         total = self._tree(futures, add)
         try:
@@ -417,18 +419,18 @@ class Cluster:
         return list(self._client.map(perform, items, parcel=parcel, pure=False, retries=RETRIES))
 
     def _to_workers(self, function: Function, shared: Any) -> Any:
-        """What tasks need, as the result of a task."""
-        with warnings.catch_warnings():  # of a parcel of some megabytes, which goes to the scheduler once
+        """The function and the shared data of tasks, as the result of a task."""
+        with warnings.catch_warnings():  # about large parcels, sent only once
             warnings.filterwarnings("ignore", "Sending large graph")
             return self._client.submit(_kept, Parcel.of((function, shared)), pure=False)
 
     def _check_versions(self) -> None:
-        """See that all workers have what they are to run: one that lacks a function is lost for good.
+        """Check the package version of all workers: a worker without a function would fail for good.
 
         Raises:
-            InputError: one has another version of the package, or none.
+            InputError: a worker has another version of the package, or none.
         """
-        # By a function of Python's own, which all have.
+        # Calls a function of the standard library, which all workers have.
         found = self._client.run(pydoc.locate, "vcc.base.version.VERSION", on_error="return")
         for address, version in found.items():
             if version is None or (isinstance(version, str) and version != VERSION):
@@ -439,7 +441,7 @@ class Cluster:
                 )
 
     def _begin(self, parcel: Any) -> None:
-        """What is done once on each machine, or when the first worker comes."""
+        """Run the first task once on each machine, or when the first worker arrives."""
         if not self.places:
             warn_of_result(f"the Dask scheduler {self._address} has no workers yet: work begins when one comes")
         workers = self._client.scheduler_info()["workers"]
@@ -468,7 +470,7 @@ class Cluster:
         return futures[0]
 
     def _check(self, future: Any) -> None:
-        """Raise what ended a task that was to be done."""
+        """Raise the error of a task that failed or was cancelled."""
         if future.status == "error":
             self._result(future)
         if future.status == "cancelled":
@@ -490,10 +492,10 @@ class Cluster:
             raise
 
     def _look(self) -> None:
-        """See whether the scheduler is still there, by asking it.
+        """Check that the scheduler still answers.
 
         Raises:
-            InputError: it is not, or does not answer.
+            InputError: the connection is lost, or the scheduler does not answer.
         """
         if self._client.status != "running":
             raise self._lost()
@@ -520,7 +522,7 @@ class Cluster:
         return str(getattr(scheduler, "address", "")) or "that was given"
 
     def _cancel(self, futures: Sequence[Any]) -> None:
-        """End what is not done, where there is anybody to be told."""
+        """Cancel unfinished futures if the scheduler still answers."""
         waiting = [future for future in futures if future is not None and not future.done()]
         if waiting and self._client.status == "running" and not self._silent:
             self._client.cancel(waiting)

@@ -1,13 +1,13 @@
-"""What a sensor records: irradiance to photons, electrons and digital numbers, and back.
+"""A sensor's recording: from irradiance to photons, electrons and digital numbers, and back.
 
-The model is that of EMVA 1288 (`vcc.optics.electronics`). Random numbers are drawn for blocks of rows, each with a
-stream of its own that follows from the seed alone: a recording is the same whatever the number of threads.
+The model is EMVA 1288 (`vcc.optics.electronics`). Random numbers are drawn for blocks of rows. Each block has its
+own stream, which depends only on the seed: a recording does not depend on the number of threads.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -22,23 +22,23 @@ from vcc.optics.sensor import Sensor
 from vcc.plan.how import cores
 
 AUTO_SHARE: Final = 0.001
-"""Exposure "auto": the share of the pixels that may be brighter …"""
+"""Exposure "auto": the share of the pixels that may exceed …"""
 AUTO_LEVEL: Final = 0.9
-"""… than this share of the electrons at which a pixel saturates."""
+"""… this share of the electrons at which a pixel saturates."""
 
 UNDERSHOOT: Final = 0.15
-"""Of the largest value: as far below 0 a picture may go beside an edge from dark to its brightest light, by what
-interpolation compensates (13 % at a border of the light field itself)."""
+"""How far below 0 an image may go, as a share of its largest value: sharpening interpolation undershoots at edges
+(13 % at a border of the light field)."""
 
 _BLOCK: Final = 2**18
-"""Numbers drawn at once: they stay in the cache of a core, and a large sensor has enough blocks for all."""
+"""Random numbers per block: a block fits a core's cache, and a large sensor has enough blocks for all cores."""
 _TEMPORAL, _PATTERN = 0, 1
-"""Streams of random numbers: noise that is new in each recording, and what belongs to the sensor."""
+"""Streams of random numbers: noise that differs in each recording, and the sensor's fixed pattern."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RawPicture:
-    """The digital numbers that a sensor gave, and what is needed to understand them; see `vcc.Recording`."""
+    """The digital numbers that a sensor recorded, with the data to interpret them; see `vcc.Recording`."""
 
     values: NDArray[Any]
     sensor: Sensor
@@ -69,7 +69,7 @@ class RawPicture:
 
     @property
     def electronics(self) -> Electronics:
-        """What turned light into these numbers."""
+        """The electronics that recorded these numbers."""
         return electronics_of(self.sensor)
 
     @property
@@ -78,10 +78,10 @@ class RawPicture:
         return self.sensor.frame
 
     def electrons(self) -> NDArray[np.float32]:
-        """The charge that the numbers stand for: (DN − black level) / K, electrons, those of the dark current too.
+        """The charge: (DN − black level) / K, electrons, including the dark current's.
 
         Returns:
-            float32 in the shape of the values; below 0 where read noise went below the black level.
+            float32 in the shape of the values; negative where read noise goes below the black level.
         """
         charge = self.values.astype(np.float32)
         charge -= np.float32(self.electronics.black_level)
@@ -89,7 +89,7 @@ class RawPicture:
         return charge
 
     def irradiance(self) -> NDArray[np.float32]:
-        """The irradiance that the numbers tell of, as `vcc.Recording.image` has it, in the shape of the values."""
+        """The irradiance estimated from the numbers, as in `vcc.Recording.image`, in the shape of the values."""
         light = self.electrons()
         light -= np.float32(self.electronics.dark_current * self.exposure)
         per_light = self._electrons_per_light()
@@ -101,7 +101,7 @@ class RawPicture:
         return light
 
     def _electrons_per_light(self) -> list[float]:
-        """Photo-electrons that an irradiance of 1 (radiance of 1 × steradian) frees, for each channel."""
+        """Photo-electrons for an irradiance of 1 (radiance of 1 × steradian), for each channel."""
         channels = self.values.shape[2] if self.values.ndim == 3 else self.electronics.filter_channels
         per_second = [_electrons_per_second(self.sensor, self.radiance, channel) for channel in range(channels)]
         return [rate * self.exposure for rate in per_second]
@@ -109,19 +109,20 @@ class RawPicture:
 
 @dataclass(frozen=True)
 class Exposure:
-    """How a sensor is to record; all that can be refused is refused when this is made, before any work.
+    """The settings of a recording; they are checked here, before any work.
 
     Args:
         sensor: with electronics.
-        time: seconds, or ``"auto"``: that after which the brightest 0.1 % of the pixels are at 90 % or more of
-            their full well or of the largest number, whichever comes first, each in its brightest
-            channel.
-        seed: of the noise, a whole number.
-        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
-        threads: how many work at once; None takes as many as this process may use cores.
+        time: seconds, or ``"auto"``: the time after which the brightest 0.1 % of the pixels, each in its brightest
+            channel, reach at least 90 % of the full well or of the largest number, whichever comes first.
+        seed: of the noise, an integer.
+        radiance: the radiance of a light field's sample value of 1, W/(m²·sr), in each channel's band.
+        threads: how many run at once; None uses all cores available to this process.
+        photodiode: number of the photodiode of each pixel whose noise is drawn.
 
     Raises:
-        InputError: a sensor without electronics, an unusable time, seed or radiance.
+        InputError: a sensor without electronics, an unusable time, seed or radiance, or photodiodes whose sum needs
+            more than 16 bits.
     """
 
     sensor: Sensor
@@ -129,33 +130,41 @@ class Exposure:
     seed: int = 0
     radiance: float = 1.0
     threads: int | None = None
+    photodiode: int = 0
 
     def __post_init__(self) -> None:
-        electronics_of(self.sensor)
+        electronics_of(self.sensor).binned(math.prod(self.sensor.photodiodes))
         if not (isinstance(self.time, str) and self.time == "auto"):
             object.__setattr__(self, "time", checked_exposure(self.time))
         object.__setattr__(self, "seed", checks.seed(self.seed))
         object.__setattr__(self, "radiance", _checked_radiance(self.radiance))
 
     def check_channels(self, channels: int | None) -> None:
-        """Refuse light of a number of channels that the sensor cannot record; None is grey.
+        """Check that the sensor can record light with this number of channels; None is grey.
 
         Raises:
             InputError: the numbers of channels differ.
         """
         electronics_of(self.sensor).check_channels(channels)
 
+    def timed(self, light: NDArray[np.float32]) -> Exposure:
+        """With the time that ``"auto"`` gives for this irradiance; see `recorded`."""
+        if not isinstance(self.time, str):
+            return self
+        rate = _photo_electrons_per_second(light, self.sensor, self.radiance)
+        return replace(self, time=_auto_exposure(rate, electronics_of(self.sensor)))
+
     def recorded(self, light: NDArray[np.float32], missing_rays: float = 0.0) -> RawPicture:
-        """What the sensor records of irradiance that falls on it.
+        """The recording of irradiance on the sensor.
 
         Args:
-            light: radiance × steradian, (rows, columns) or (rows, columns, channels), upside down as it lands.
-                What is below 0 is dark.
-            missing_rays: the share of the rays that were asked for and not there, 0 to 1.
+            light: radiance × steradian, (rows, columns) or (rows, columns, channels), inverted as on the sensor.
+                Negative values count as 0.
+            missing_rays: share of the required rays that are outside the light field, 0 to 1.
 
         Raises:
-            InputError: another shape than the sensor's, channels that it cannot record, values that are not
-                finite; or "auto" without light.
+            InputError: a shape other than the sensor's, unsupported channels, values that are not finite; or
+                "auto" without light.
         """
         electronics = electronics_of(self.sensor)
         if light.shape[:2] != self.sensor.shape:
@@ -165,15 +174,15 @@ class Exposure:
         self.check_channels(light.shape[2] if light.ndim == 3 else None)
         rate = _photo_electrons_per_second(light, self.sensor, self.radiance)
         time = _auto_exposure(rate, electronics) if isinstance(self.time, str) else self.time
-        values, saturated = numbers_of(rate, time, electronics, self.seed, self.threads)
+        values, saturated = numbers_of(rate, time, electronics, self.seed, self.threads, self.photodiode)
         return RawPicture(values, self.sensor, time, self.radiance, self.seed, saturated, missing_rays)
 
 
 def electronics_of(sensor: Sensor) -> Electronics:
-    """The electronics of a sensor that is to record.
+    """The electronics of a sensor.
 
     Raises:
-        InputError: it has none.
+        InputError: the sensor has none.
     """
     if sensor.electronics is None:
         raise InputError(
@@ -184,7 +193,7 @@ def electronics_of(sensor: Sensor) -> Electronics:
 
 
 def below_zero(light: NDArray[np.float32]) -> str | None:
-    """A caution about a picture that goes further below 0 than interpolation takes it; None where none is due."""
+    """A warning about an image that is more negative than interpolation explains; None if there is no reason."""
     low, high = float(light.min()), float(light.max())
     if not low < -UNDERSHOOT * max(high, 0.0):
         return None
@@ -198,7 +207,7 @@ def checked_exposure(exposure: object) -> float:
     """An exposure time in seconds.
 
     Raises:
-        InputError: no number above 0.
+        InputError: not a positive number.
     """
     way_out = 'give a time such as 10 * vcc.units.ms, or "auto"'
     return checks.above_zero("exposure", exposure, unit="s", way_out=way_out)
@@ -220,7 +229,7 @@ def _electrons_per_second(sensor: Sensor, radiance: float, channel: int) -> floa
 def _photo_electrons_per_second(
     light: NDArray[np.float32], sensor: Sensor, radiance: float
 ) -> NDArray[np.float64]:
-    """The mean rate at which light frees electrons in each pixel, behind its colour filter."""
+    """The mean rate of photo-electrons in each pixel, behind its colour filter."""
     if not (math.isfinite(light.min()) and math.isfinite(light.max())):
         raise InputError("the picture on the sensor has values that are not finite: no exposure can record them")
     electronics = electronics_of(sensor)
@@ -252,16 +261,22 @@ def _auto_exposure(rate: NDArray[np.float64], electronics: Electronics) -> float
 
 
 def numbers_of(
-    rate: NDArray[np.float64], exposure: float, electronics: Electronics, seed: int, threads: int | None = None
+    rate: NDArray[np.float64],
+    exposure: float,
+    electronics: Electronics,
+    seed: int,
+    threads: int | None = None,
+    photodiode: int = 0,
 ) -> tuple[NDArray[Any], float]:
     """Digital numbers for the mean rates of photo-electrons, and the share of pixels that are saturated.
 
     Args:
         rate: electrons per second, (rows, columns) or (rows, columns, channels).
         exposure: seconds.
-        electronics: what numbers the electrons.
+        electronics: converts electrons to numbers.
         seed: of the noise.
-        threads: how many work at once; None takes as many as this process may use cores.
+        threads: how many run at once; None uses all cores available to this process.
+        photodiode: number of the photodiode of each pixel whose noise is drawn.
     """
     rows = rate.shape[0]
     height = _rows_of_a_block(rate.shape)
@@ -269,9 +284,9 @@ def numbers_of(
 
     def read_block(block: int) -> int:
         lines = slice(block * height, min((block + 1) * height, rows))
-        noise, pattern = _generator(seed, _TEMPORAL, block), None
+        noise, pattern = _generator(seed, _TEMPORAL, block, photodiode), None
         if electronics.prnu or electronics.dsnu:
-            pattern = _generator(electronics.pattern_seed, _PATTERN, block)
+            pattern = _generator(electronics.pattern_seed, _PATTERN, block, photodiode)
         values[lines], saturated = _read_block(rate[lines], exposure, electronics, noise, pattern)
         return saturated
 
@@ -283,14 +298,14 @@ def numbers_of(
 def fixed_pattern(
     shape: tuple[int, ...], electronics: Electronics
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """What belongs to a sensor: by how much each pixel's sensitivity and offset differ, in units of PRNU and DSNU.
+    """A sensor's fixed pattern: deviations of each pixel's sensitivity and offset, in units of PRNU and DSNU.
 
     Args:
-        shape: of what it records, (rows, columns) or (rows, columns, channels).
-        electronics: of whose seed the pattern follows.
+        shape: of a recording, (rows, columns) or (rows, columns, channels).
+        electronics: its pattern seed determines the pattern.
 
     Returns:
-        Normal numbers, two arrays of that shape.
+        Normally distributed numbers, two arrays of this shape.
     """
     height = _rows_of_a_block(shape)
     drawn = []
@@ -305,8 +320,9 @@ def _rows_of_a_block(shape: tuple[int, ...]) -> int:
     return max(1, _BLOCK // max(1, math.prod(shape[1:])))
 
 
-def _generator(seed: int, stream: int, block: int) -> np.random.Generator:
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream, block)))
+def _generator(seed: int, stream: int, block: int, photodiode: int = 0) -> np.random.Generator:
+    key = (stream, block, photodiode) if photodiode else (stream, block)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
 def _read_block(
@@ -324,8 +340,8 @@ def _read_block(
         offsets = electronics.dsnu * pattern.standard_normal(rate.shape)
         mean *= np.maximum(1 + electronics.prnu * sensitivity, 0.0)
     mean += electronics.dark_current * exposure
-    # Of such a mean, the full well lies 10 standard deviations or more below: it fills for certain, and means
-    # that are too large for NumPy's Poisson numbers never reach it.
+    # The full well is at least 10 standard deviations below this mean, so that it surely fills; and NumPy's
+    # Poisson generator does not support larger means.
     np.minimum(mean, 2 * electronics.full_well + 100, out=mean)
     charge = noise.poisson(mean)
     full = charge >= electronics.full_well

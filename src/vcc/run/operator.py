@@ -1,7 +1,7 @@
-"""The linear map from a light field's samples to the picture that a camera makes of them, and its adjoint.
+"""A camera as a linear map from a light field's samples to an image, and its adjoint.
 
-A camera, a grid of rays and a way to compute make a matrix A, too large to be written down: a row for each value
-of the picture, a column for each sample. `Operator` multiplies by it, its adjoint by its transpose.
+A camera, a grid of rays and a method define a matrix A, too large to store: one row per value of the image, one
+column per sample. `Operator` multiplies by A, its adjoint by the transpose.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from vcc.run.required_samples import required_samples
 
 
 class Slots(Protocol):
-    """What takes samples piece by piece: an array of NumPy, in memory or mapped from disk, or one of Zarr."""
+    """An array that accepts samples piece by piece: of NumPy, in memory or mapped from disk, or of Zarr."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -38,25 +38,25 @@ class Slots(Protocol):
         ...
 
     def __setitem__(self, index: Any, values: Any) -> None:
-        """Keep a piece."""
+        """Store a piece."""
         ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Operator:
-    """A camera as a linear map A from the samples of a light field to a picture; made by `vcc.Camera.operator`.
+    """A camera as a linear map A from the samples of a light field to an image; made by `vcc.Camera.operator`.
 
-    ``op(samples)`` is the picture, A · samples; ``op.T(picture)`` is Aᵀ · picture. A sample of 1 is radiance 1,
-    whatever the numbers of the light field stand for, and samples may be negative.
+    ``op(samples)`` returns the image, A · samples; ``op.T(picture)`` returns Aᵀ · image. A sample of 1 is
+    radiance 1, whatever the data type of the light field, and samples may be negative.
 
     Args:
-        plan: by which the picture is made.
-        light_field: on whose grid the samples are.
+        plan: computes the image.
+        light_field: defines the grid of the samples.
         how: engine, threads and memory.
 
     Raises:
-        InputError: what is no linear map that can be gone through backwards, with the way out: a tolerance, views
-            in between by depth, samples that are not NumPy's.
+        InputError: a tolerance, intermediate views interpolated by depth, or samples that are not NumPy arrays:
+            these are not one linear map with a known transpose. The message names the alternative.
     """
 
     plan: Plan
@@ -69,20 +69,21 @@ class Operator:
     def __call__(
         self, samples: Any = None, *, executor: Any = None, progress: Progress | None = None
     ) -> NDArray[Any]:
-        """The picture that the camera makes of samples.
+        """The image of some samples.
 
         Args:
-            samples: floating-point numbers of `samples_shape`, or several light fields, (n, …); None takes those
-                of the light field.
-            executor: who runs blocks of them, as in `vcc.Camera.capture`.
-            progress: called with (done, total), for each light field anew.
+            samples: floating-point numbers of `samples_shape`, or several light fields, (n, …); None uses the
+                samples of the light field.
+            executor: runs the blocks, as in `vcc.Camera.capture`.
+            progress: called with (done, total), separately for each light field.
 
         Returns:
-            (rows, columns[, channels]), or (n, …): irradiance, as `vcc.Camera.capture` gives it, of type `dtype`.
+            (rows, columns[, channels]), or (n, …): irradiance, as `vcc.Camera.capture` returns it, of type
+            `dtype`.
 
         Raises:
-            InputError: samples of another shape, of another type than floating point, or not finite; what an
-                executor does not take, or one that dies.
+            InputError: samples of a wrong shape, not floating point, or not finite; samples that an executor
+                does not support, or an executor that fails.
         """
         if samples is None:
             return self._picture(self.light_field, executor, progress)
@@ -100,7 +101,7 @@ class Operator:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """As of a matrix: (values of the picture, samples)."""
+        """Shape of the matrix: (values of the image, samples)."""
         return math.prod(self.picture_shape), math.prod(self.samples_shape)
 
     @property
@@ -116,14 +117,15 @@ class Operator:
     @property
     @cached
     def dtype(self) -> np.dtype[Any]:
-        """Of what is given back: float32, or float64 by ``engine="reference"``."""
+        """Data type of the results: float32, or float64 with ``engine="reference"``."""
         return np.dtype(np.float64 if self._drive(self.light_field).able.double else np.float32)
 
     def as_scipy(self) -> Any:
-        """The same for SciPy's solvers, such as ``scipy.sparse.linalg.lsqr``.
+        """The map for SciPy's solvers, such as ``scipy.sparse.linalg.lsqr``.
 
         Returns:
-            A `scipy.sparse.linalg.LinearOperator` of this shape and type; vectors are samples and pictures, flat.
+            A `scipy.sparse.linalg.LinearOperator` of this shape and type; vectors are flattened samples and
+            images.
         """
         from scipy.sparse.linalg import LinearOperator
 
@@ -143,20 +145,20 @@ class Operator:
         )
 
     def as_deepinv(self, *, scale: float = 1.0, **options: Any) -> Any:
-        """The same for the solvers, priors and networks of `deepinv`; needs the extra of that name.
+        """The map for the solvers, priors and networks of `deepinv`; needs the extra of that name.
 
         Args:
-            scale: by which pictures are multiplied, and samples on the way back. The solvers of `deepinv` are made
-                for operators of norm 1, and irradiance is far less than radiance: 1/norm serves them.
+            scale: factor of images, and of samples in the adjoint. The solvers of `deepinv` assume operators
+                of norm 1, and irradiance is far less than radiance: use 1/norm.
             options: of `deepinv.physics.LinearPhysics`, such as ``noise_model`` or ``max_iter``.
 
         Returns:
             A `deepinv.physics.LinearPhysics` between tensors on the CPU: samples (B, channels, v, u, t, s) and
-            pictures (B, channels, rows, columns), channels 1 where the light field has none. What it gives has the
-            type `dtype` and carries gradients, of any order.
+            images (B, channels, rows, columns), with 1 channel if the light field has none. Results have the type
+            `dtype` and carry gradients of any order.
 
         Raises:
-            InputError: deepinv is not there, or does not load; a scale that is not positive.
+            InputError: deepinv is not installed, or does not load; a scale that is not positive.
         """
         physics = lazy_import.module("vcc.run.torch_physics")
         return physics.linear_physics(self, self.samples_shape, self.picture_shape, scale, options)
@@ -175,14 +177,14 @@ class Operator:
         return picture
 
     def _backwards(self, executor: Any = None) -> Backwards:
-        """The way back to samples that nobody looks at: of stored ones, and by others, in blocks."""
+        """The reverse pass; samples are not read. For stored samples and with an executor it runs in blocks."""
         grid = replace(self.light_field.grid, kind=self.dtype, disparities=Disparities())
         if executor is not None or self.light_field.whole() is None:
             return Backwards(self._drive(_Unread(grid), executor))
         return Backwards(self._drive(InMemory.of(np.broadcast_to(np.zeros((), self.dtype), grid.shape), grid)))
 
     def _checked(self, what: str, given: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-        """Numbers of a shape, or several of them, in this type."""
+        """An array of a shape, or several, checked and converted to `dtype`."""
         if (library := library_of(given)) not in ("numpy", "builtins"):
             raise InputError(
                 f"an operator takes arrays of NumPy, not of {library}: pass numpy.asarray({what}); "
@@ -207,10 +209,10 @@ class Operator:
 
 @dataclass(frozen=True, eq=False)
 class Adjoint:
-    """The adjoint Aᵀ of an `Operator`: what each sample gets of a picture.
+    """The adjoint Aᵀ of an `Operator`: it maps images to samples.
 
-    For all samples x and pictures y, ⟨op(x), y⟩ = ⟨x, op.T(y)⟩ to rounding. It is what least squares need, and
-    what a display would do whose pixels stand where the sensor's do, with its light going the other way.
+    For all samples x and images y, ⟨op(x), y⟩ = ⟨x, op.T(y)⟩ to rounding. Least squares need the adjoint. It also
+    describes a display with its pixels at those of the sensor, whose light travels backwards.
     """
 
     T: Operator
@@ -218,23 +220,25 @@ class Adjoint:
     def __call__(
         self, picture: Any, *, out: Slots | None = None, executor: Any = None, progress: Progress | None = None
     ) -> Any:
-        """The samples Aᵀ · picture.
+        """The samples Aᵀ · image.
 
         Args:
-            picture: floating-point numbers of ``op.picture_shape``, or several pictures, (n, …).
-            out: where to put the samples of one picture, an array of ``op.samples_shape`` (of NumPy, mapped from
-                disk, of Zarr), piece by piece: there need be no room for them in memory; None makes an array.
-            executor: who goes back to blocks of views, as in `vcc.Camera.capture`. What they find comes here, a
-                few blocks at a time, and is put into ``out`` here: others need not reach it.
-            progress: called with (done, total), for each picture anew.
+            picture: floating-point numbers of ``op.picture_shape``, or several images, (n, …).
+            out: an array of ``op.samples_shape`` (of NumPy, mapped from disk, of Zarr) that receives the
+                samples of one image, piece by piece, so that they need not fit in memory; None allocates an
+                array.
+            executor: runs the adjoint for blocks of views, as in `vcc.Camera.capture`. Results come to this
+                process, a few blocks at a time, and are written to ``out`` here: workers need no access to
+                it.
+            progress: called with (done, total), separately for each image.
 
         Returns:
             ``out``, or samples of ``op.samples_shape``, or (n, …), of ``op.dtype``.
 
         Raises:
-            InputError: a picture of another shape, of another type than floating point, or not finite; of a light
-                field on disk, samples that take more than the memory limit; what an executor does not take, or one
-                that dies.
+            InputError: an image of a wrong shape, not floating point, or not finite; samples of a stored
+                light field that exceed the memory limit; samples that an executor does not support, or an
+                executor that fails.
         """
         checked = self.T._checked("pictures", picture, self.T.picture_shape)
         if out is not None:
@@ -243,13 +247,13 @@ class Adjoint:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """As of a matrix: (samples, values of the picture)."""
+        """Shape of the matrix: (samples, values of the image)."""
         return self.T.shape[::-1]
 
     def pieces(
         self, picture: Any, *, executor: Any = None, progress: Progress | None = None
     ) -> Iterator[tuple[Block, NDArray[Any]]]:
-        """The samples Aᵀ · picture in pieces that are in memory one at a time.
+        """The samples Aᵀ · image, in pieces, only one of them in memory at a time.
 
         Args:
             picture: of ``op.picture_shape``.
@@ -257,7 +261,7 @@ class Adjoint:
             progress: called with (done, total).
 
         Yields:
-            (block, samples): ``block.slices`` is where they belong. Views in none of them get nothing.
+            (block, samples): ``block.slices`` is their place. Views that are in no block have samples of 0.
 
         Raises:
             InputError: see the call.
@@ -269,7 +273,7 @@ class Adjoint:
         return f"{self.T!r}.T"
 
     def _samples(self, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Any:
-        if executor is not None and self.T.light_field.whole() is not None:  # where there is room for as many
+        if executor is not None and self.T.light_field.whole() is not None:  # it fits in memory as well
             made = np.empty(self.T.samples_shape, self.T.dtype)
             return self._into(made, picture, executor, progress)
         return self.T._backwards(executor).gradient(picture, progress=progress).samples
@@ -288,24 +292,24 @@ class Adjoint:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Unread:
-    """The samples of a grid that lie elsewhere and are not looked at."""
+    """A grid whose samples are never read."""
 
     grid: Grid
     stored_bytes = 0
 
     def whole(self) -> None:
-        """They are not in memory."""
+        """None: the samples are not in memory."""
 
     def check_complete(self) -> None:
-        """None is needed."""
+        """Do nothing: no sample is needed."""
 
     def read(self, block: Block) -> Any:
-        """Nothing backwards looks at samples where no number is wanted."""
+        """Raise an error: the reverse pass reads no samples if no gradient of a parameter is wanted."""
         raise AssertionError("samples are looked at")
 
 
 def _each(
     given: NDArray[Any], shape: tuple[int, ...], verb: Callable[[NDArray[Any]], NDArray[Any]]
 ) -> NDArray[Any]:
-    """What a verb makes of an array of a shape, or of each of several."""
+    """The result of ``verb`` for an array of a shape, or the stacked results for several."""
     return verb(given) if given.shape == shape else np.stack([verb(one) for one in given])

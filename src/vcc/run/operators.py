@@ -1,9 +1,9 @@
-"""The paper's operators on a light field itself, for those who want the field and not only the picture.
+"""The paper's operators on a light field: they return light fields instead of images.
 
-𝕋 (`LightField.transformed`) is exact and lazy. The others here make new samples: `resampled` puts the field
-on another grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor (S). A
-camera's picture needs none of them; they cost what 4-D data cost, so the size is computed first and refused
-above a limit.
+𝕋 (`LightField.transformed`) is exact and lazy. The other operators compute new samples: `resampled` changes the
+grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor (S). A camera's
+image needs none of them. They process 4-D data, so the size is computed first, and a size above the memory
+limit raises an error.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.shapes.patterns import Pattern
 
 Field = TypeVar("Field", bound=InMemory)
-"""A light field in memory: what is made of it is of its own type."""
+"""A light field in memory; results have the same type."""
 
 SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
 
@@ -46,11 +46,11 @@ def masked_at(
     planes: list[tuple[Pattern, tuple[float, float], Affine]],
     memory_limit: int | None = None,
 ) -> Field:
-    """The light field times what patterns at several planes let pass; its own plane and frame stay.
+    """The light field times the transmission of patterns at several planes; its plane and frame stay the same.
 
     Args:
         light_field: at some plane.
-        planes: for each pattern: the pattern, the place (x, y) of its middle in metres, and the map of rays
+        planes: for each pattern: the pattern, the position (x, y) of its centre in metres, and the map of rays
             from the light field's plane to the pattern's.
         memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
@@ -79,7 +79,7 @@ def carried_to(
     """The light field at a plane inside a camera; see `vcc.Camera.light_field_at`.
 
     Raises:
-        InputError: z behind the sensor, or an element on the way that bends rays not as a lens or a prism does.
+        InputError: z behind the sensor, or an element before z that is not affine, unlike a lens or a prism.
     """
     if z > train.sensor.z:
         raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {train.sensor.z * 1e3:g} mm")
@@ -95,7 +95,7 @@ def carried_to(
         if stage.faces.pattern is not None:
             planes.append((stage.faces.pattern, stage.element.decentre, stage.arriving))
         if stage.faces.spread is not None:
-            # At the diffuser, and back to the plane at which the masks to come are told from.
+            # To the diffuser, and back to the plane to which the maps of the next masks refer.
             arriving = transformed(masked_at(light_field, planes, memory_limit), stage.arriving)
             planes = []
             light_field = transformed(scattered_by(arriving, stage, memory_limit), stage.arriving.inverse())
@@ -104,19 +104,19 @@ def carried_to(
 
 
 def _passed(stage: Stage, z: float, before: bool) -> bool:
-    """Whether light has met a stage at z: those exactly there too, unless asked for before them."""
+    """Whether light has passed a stage at z; a stage exactly at z counts unless ``before``."""
     return stage.element.z < z or (stage.element.z == z and not before)
 
 
 def transformed(light_field: Field, rays: Affine) -> Field:
-    """The light field after a map of rays: 𝕋 of the paper (section 3.2.1); no sample is touched."""
+    """The light field after a map of rays: 𝕋 of the paper (section 3.2.1); the samples are not modified."""
     return light_field.of(light_field.values, light_field.grid.moved(rays))
 
 
 def _weights(
     light_field: Field, pattern: Pattern, decentre: tuple[float, float], rays: Affine
 ) -> Callable[[int, int], Any]:
-    """What a pattern lets pass of view (j, i): a number where it tells views apart only, else (rows, columns)."""
+    """Transmission of a pattern for view (j, i): a number if it depends on the view only, else (rows, columns)."""
     nv, nu, nt, ns = light_field.shape[:4]
     plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
     views, still = Taps.of((nv, nu), CellDivision(1, False)), np.zeros((2, 2))
@@ -126,7 +126,7 @@ def _weights(
     met = MaskMet.of(plane, views, np.zeros_like(views.index), still, (nt, ns), fine=1)
     lookup, _ = met.look_up(met.choices())
     k, l = np.arange(ns, dtype=float), np.arange(nt, dtype=float)
-    # A texture that makes up for being looked up by splines may pass 0 beside an edge; light does not.
+    # A texture that is prefiltered for splines may undershoot 0 beside an edge; transmission does not.
     return lambda j, i: np.maximum(lookup.weights(j, i, k, l), 0.0)
 
 
@@ -147,14 +147,14 @@ def scattered(light_field: Field, diffuser: Element, memory_limit: int | None = 
             f"{diffuser.label} also bends rays: scatter with an element that only scatters, and use "
             "lf.transformed() for the bending, or put it in a vcc.Camera"
         )
-    if faces.pattern is not None:  # places are left alone, so that it does not matter which comes first
+    if faces.pattern is not None:  # positions stay: the order does not matter
         plane = (faces.pattern, diffuser.decentre, Affine.identity())
         light_field = masked_at(light_field, [plane], memory_limit)
     return scattered_by(light_field, Stage(diffuser, 0.0, Affine.identity(), faces), memory_limit)
 
 
 def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = None) -> Field:
-    """The light field just behind a stage that lies in its plane, scattered; what else it does is left out.
+    """The light field just behind a scattering stage in its plane; other effects of the stage are ignored.
 
     Args:
         light_field: at the stage's plane.
@@ -162,7 +162,7 @@ def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = No
         memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
-        InputError: places of rays that depend on the pixel, not on the view alone; a kernel over too many samples;
+        InputError: ray positions that depend on the pixel, not on the view alone; a kernel over too many samples;
             more memory needed than allowed.
     """
     from scipy.signal import oaconvolve
@@ -182,10 +182,10 @@ def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = No
         rows, columns = (size // 2 for size in weights[j][i].shape)
         inside = result[j, i, high - rows : high + nt + rows, wide - columns : wide + ns + columns]
         kernel = weights[j][i] if values.ndim == 4 else weights[j][i][:, :, None]
-        # In double precision: what Fourier transforms round to in the dark would else add up over a view.
+        # In double precision: rounding errors of Fourier transforms in dark regions would add up over a view.
         view = values[j, i].astype(np.float64) / light_field.grid.full_scale
         np.maximum(oaconvolve(view, kernel, axes=(0, 1)), 0.0, out=inside, casting="same_kind")
-    # Scattering moves nothing: what is followed between views stays, and maps are found where they are asked for.
+    # Scattering does not move points: the disparity range stays, and maps are computed on demand.
     disparities = Disparities(
         find=lambda progress: maps_of(made, progress), measure=light_field.grid.disparities.range
     )
@@ -195,7 +195,7 @@ def scattered_by(light_field: Field, stage: Stage, memory_limit: int | None = No
 
 
 def _check_places_of_views(light_field: InMemory, label: str) -> None:
-    """Refuse a light field whose views are not each in one place.
+    """Check that all rays of a view have the same position.
 
     Raises:
         InputError: see `scattered_by`.
@@ -214,7 +214,7 @@ def _check_places_of_views(light_field: InMemory, label: str) -> None:
 def _view_weights(
     scatter: Scatter, light_field: Field, decentre: tuple[float, float]
 ) -> list[list[NDArray[np.float64]]]:
-    """The kernel in the middle of each view's cell, as weights on the lattice of a view's samples."""
+    """The kernel at the centre of each view's cell, as weights on the lattice of a view's samples."""
     nv, nu = light_field.shape[:2]
     steps_from_slopes = light_field.frame.inverse().linear[2:, 2:]
     if scatter.uniform:
@@ -235,7 +235,7 @@ def _view_weights(
 
 
 def _about_one_middle(parts: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """The sum of arrays of odd sizes that have their middle in common."""
+    """The sum of arrays of odd sizes, aligned at their centres."""
     rows, columns = (max(part.shape[axis] for part in parts) for axis in (0, 1))
     total = np.zeros((rows, columns))
     for part in parts:
@@ -271,10 +271,10 @@ def resampled(
             offset,
             output_shape=shape,
             order=SPLINE_ORDER[interpolation],
-            mode="grid-constant",  # zero beyond the border, and interpolated towards it
+            mode="grid-constant",  # zero outside, and interpolated towards the border
             output=np.float32,
         )
-    np.maximum(result, 0, out=result)  # a spline may undershoot; radiance does not
+    np.maximum(result, 0, out=result)  # splines may undershoot; radiance is not negative
     final: NDArray[np.float32] = result if light_field.grid.channels is not None else result[..., 0]
     alone: dict[str, Any] = {"disparity_range": None, "disparity": None, "extent": None, "beyond": ALL}
     return replace(light_field, values=final, frame=frame, **alone)

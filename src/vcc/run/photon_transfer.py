@@ -1,4 +1,4 @@
-"""The photon transfer curve: what EMVA 1288 reads of a sensor from flat fields."""
+"""The photon transfer curve of EMVA 1288: sensor parameters from flat fields."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _QUANTISATION: Final = 1 / 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotonTransfer(Brief):
-    """Means and temporal variances of flat fields, and what EMVA 1288 reads from them.
+    """Means and temporal variances of flat fields, and the sensor parameters that EMVA 1288 derives from them.
 
     Args:
         mean: mean number μ_y of each pair of flats, DN, from dark to bright.
@@ -37,23 +37,23 @@ class PhotonTransfer(Brief):
 
     @property
     def fitted(self) -> NDArray[np.bool_]:
-        """Which flats the gain is fitted to: those up to 70 % of saturation, as EMVA 1288 has it."""
+        """Which flats are used to fit the gain: up to 70 % of saturation, as in EMVA 1288."""
         signal = self.mean - self.dark_mean
         return np.asarray(signal <= 0.7 * signal.max())
 
     @property
     def gain(self) -> float:
-        """K, DN per electron: the slope of variance against mean, both without their dark part."""
+        """K, DN per electron: the slope of variance against mean, both without the dark signal."""
         signal = (self.mean - self.dark_mean)[self.fitted]
         variance = (self.variance - self.dark_variance)[self.fitted]
         return float(signal @ variance / (signal @ signal))
 
     @property
     def read_noise(self) -> float:
-        """σ_d, electrons: dark noise without what rounding adds (1/12 DN²).
+        """σ_d, electrons: dark noise without the rounding noise (1/12 DN²).
 
         Raises:
-            InputError: dark noise below 0.24 DN², where EMVA 1288 says that rounding hides it.
+            InputError: dark noise below 0.24 DN², which rounding hides according to EMVA 1288.
         """
         if self.dark_variance < 0.24:
             raise InputError(
@@ -71,15 +71,15 @@ def photon_transfer(
     exposure: float = 1e-3,
     seed: int = 0,
 ) -> PhotonTransfer:
-    """The photon transfer curve of a sensor, from simulated flat fields, two a level (EMVA 1288).
+    """The photon transfer curve of a sensor, from simulated flat fields, two per level (EMVA 1288).
 
-    The temporal variance is half the variance of the difference of two flats, in which fixed patterns cancel.
+    The temporal variance is half the variance of the difference of two flats, which cancels fixed patterns.
 
     Args:
         electronics: of the sensor.
-        levels: how many, evenly up to 10 % beyond saturation; 4 or more.
-        shape: (rows, columns) of pixels that are read; the standard error of a variance is √(2 / pixels) of it.
-        exposure: exposure time, seconds; the shorter, the less dark current is in the dark noise.
+        levels: how many, evenly spaced up to 10 % beyond saturation; 4 or more.
+        shape: (rows, columns) of the pixels; the relative standard error of a variance is √(2 / pixels).
+        exposure: exposure time, seconds; a shorter time reduces the dark current in the dark noise.
         seed: of the noise.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a picture needs of a light field that is read: of each view the pixels that the sensor sees, no others."""
+"""Restrict a stored light field to the pixels of each view that the sensor sees."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from vcc.plan.model import Plan
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RequiredSamples(Brief):
-    """A part of the pixels of all views, of which those of each view are read that it needs; others are dark.
+    """A rectangle of pixels of all views; in each view only the needed pixels are read, others are 0.
 
     Args:
-        samples: of which this is a part.
-        block: which part.
-        pixels: of each view, as `Plan.used_pixels` has them.
+        samples: the full samples.
+        block: the rectangle.
+        pixels: needed pixels of each view, as in `Plan.used_pixels`.
         grid: of the part.
     """
 
@@ -34,14 +34,14 @@ class RequiredSamples(Brief):
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes of all, needed or not."""
+        """Bytes of all stored samples, needed or not."""
         return self.samples.stored_bytes
 
     def whole(self) -> None:
-        """They are read."""
+        """None: the samples are not in memory."""
 
     def check_complete(self) -> None:
-        """Refuse a light field of which views are missing."""
+        """Raise an error if views are missing."""
         self.samples.check_complete()
 
     def read(self, block: Block) -> Any:
@@ -62,23 +62,23 @@ class RequiredSamples(Brief):
 
 
 def required_samples(plan: Plan, samples: Samples) -> tuple[Plan, Samples]:
-    """A plan and samples, cut to the pixels that its picture needs: the picture stays as it is.
+    """A plan and samples, cut to the pixels that the image needs; the image does not change.
 
     Args:
-        plan: of pictures. Where views in between are made, for a piece among dark samples, and by rays that may
-            look anywhere, it stays.
-        samples: for which it is made. Those in memory stay.
+        plan: of images. It is returned as it is if it interpolates views, has a halo of dark samples, or has rays
+            that may use any pixel.
+        samples: of the plan's grid. Samples in memory are returned as they are.
     """
     (cut,), part = required_by_all([plan], samples)
     return cut, part
 
 
 def required_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan], Samples]:
-    """Several plans and the samples of which they make pictures, cut to the pixels that any of these needs.
+    """Several plans and their samples, cut to the pixels that any of the plans needs.
 
     Args:
-        plans: as for `required_samples`; where one of them stays, all do.
-        samples: likewise.
+        plans: as for `required_samples`; if one of them cannot be cut, none is.
+        samples: as for `required_samples`.
     """
     if samples.whole() is not None or any(map(_stays, plans)):
         return list(plans), samples
@@ -99,12 +99,12 @@ def required_by_all(plans: Sequence[Plan], samples: Samples) -> tuple[list[Plan]
 
 
 def _stays(plan: Plan) -> bool:
-    """Whether a plan is for the light field as it is, as what is done to it before depends on where it ends."""
+    """Whether a plan cannot be cut, since operators before the core depend on the borders of the light field."""
     return plan.views_between is not None or any(map(any, plan.halo))
 
 
 def _of_any(several: Sequence[NDArray[np.intp]], shape: tuple[int, ...]) -> NDArray[np.intp]:
-    """From where to where the pixels go that any of several needs, as `Plan.used_pixels` has them for one."""
+    """The union of the pixel ranges of several plans, as in `Plan.used_pixels`."""
     pixels = np.stack(several)
     none = (pixels[..., 1] <= pixels[..., 0]).any(axis=-1, keepdims=True)
     firsts = np.where(none, shape[2:4], pixels[..., 0]).min(axis=0)

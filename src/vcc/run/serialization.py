@@ -1,4 +1,4 @@
-"""What goes to others so that they can run blocks: a plan, what was chosen, and where samples are to be read."""
+"""The data sent to workers that run blocks: a plan, its settings, and where to read the samples."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 
 SENT = 2**26
-"""Bytes of samples in memory that are sent with the plan; more are to be read by each where they are stored."""
+"""Largest size in bytes of samples in memory that are sent with the plan; workers read larger ones from disk."""
 
 
 def check_portable(samples: Samples) -> None:
-    """Refuse samples that others cannot be sent: they are to be read by each where they are stored.
+    """Raise an error for samples that cannot be sent to workers; these must be stored where each worker reads
+    them.
 
     Raises:
-        InputError: so many in memory that each would wait for them, or an array of another library.
+        InputError: too many samples in memory, or an array of another library than NumPy.
     """
     whole = samples.whole()
     if whole is None:
@@ -48,13 +49,13 @@ def check_portable(samples: Samples) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PortableSamples(Brief):
-    """Samples as they go to others: the address of stored ones, or a small array.
+    """Samples as sent to workers: the address of stored samples, or a small array.
 
-    Known to be complete: that was looked at before they were sent.
+    They are complete: this is checked before they are sent.
 
     Args:
-        grid: of them; what they show of depth the plan knows already.
-        source: what reads them, or an array of NumPy.
+        grid: of the samples; without disparities, which the plan already contains.
+        source: reads the samples, or an array of NumPy.
     """
 
     grid: Grid
@@ -62,7 +63,7 @@ class PortableSamples(Brief):
 
     @classmethod
     def of(cls, samples: Samples) -> PortableSamples:
-        """Samples that may be sent.
+        """Check samples and prepare them for sending.
 
         Raises:
             InputError: as `check_portable`.
@@ -74,14 +75,14 @@ class PortableSamples(Brief):
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes that they take where they are read from; 0 in memory."""
+        """Bytes of the stored samples; 0 in memory."""
         return 0 if isinstance(self.source, np.ndarray) else int(self.source.stored_bytes)
 
     def whole(self) -> None:
-        """They are read block by block."""
+        """None: the samples are read block by block."""
 
     def check_complete(self) -> None:
-        """They are."""
+        """Do nothing: they are complete."""
 
     def read(self, block: Block) -> Any:
         """The samples of a block, (v, u, t, s[, channels])."""
@@ -92,11 +93,11 @@ class PortableSamples(Brief):
 
 @dataclass(frozen=True, eq=False)
 class PortableRun:
-    """All that a block's run needs but which block it is.
+    """All data that the run of a block needs, except the block itself.
 
     Args:
-        plan: of the whole: whoever runs a part of it decides nothing.
-        samples: where they are to be read.
+        plan: of the whole: workers make no choices.
+        samples: where they are read.
         how: engine, threads and memory of one task.
     """
 
@@ -106,5 +107,5 @@ class PortableRun:
 
     @classmethod
     def of(cls, plan: Plan, samples: PortableSamples, how: How) -> PortableRun:
-        """What others need: the numbers of the plan, not of what and for whom they were made."""
+        """Drop the parts of a plan that running does not need: its notes and what it was made for."""
         return cls(replace(plan, made_for=None, notes=(), cautions=()), samples, how)

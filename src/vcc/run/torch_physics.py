@@ -1,4 +1,4 @@
-"""A linear map of arrays as the physics of `deepinv`, between tensors of PyTorch; loaded when it is asked for."""
+"""A linear map of arrays as a `deepinv` physics, between tensors of PyTorch; imported on demand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ with checks.package("op.as_deepinv", "deepinv", "deepinv"):
     try:
         import torch
         from deepinv.physics import LinearPhysics
-    except RuntimeError as error:  # what torchvision ends in beside a torch that it was not built for
+    except RuntimeError as error:  # torchvision built for another torch
         raise InputError(
             f"deepinv does not load here ({error}): torch and torchvision, which it needs, have to be of one "
             "build. Install both from one place, such as pip install --force-reinstall torch torchvision "
@@ -25,7 +25,7 @@ with checks.package("op.as_deepinv", "deepinv", "deepinv"):
 
 
 class LinearMap(Protocol):
-    """What maps arrays, one or several of them, and has an adjoint."""
+    """A map of one or several arrays that has an adjoint."""
 
     @property
     def T(self) -> LinearMap:
@@ -33,20 +33,20 @@ class LinearMap(Protocol):
         ...
 
     def __call__(self, numbers: NDArray[Any], /) -> NDArray[Any]:
-        """What it makes of them."""
+        """Apply the map."""
         ...
 
 
 def linear_physics(
     ahead: LinearMap, samples: tuple[int, ...], picture: tuple[int, ...], scale: float, options: Mapping[str, Any]
 ) -> Any:
-    """The physics of a map from samples to a picture.
+    """The physics of a map from samples to an image.
 
     Args:
         ahead: the map.
-        samples: their shape, (v, u, t, s[, channels]).
-        picture: its shape, (rows, columns[, channels]).
-        scale: by which pictures are multiplied, and samples on the way back.
+        samples: shape of the samples, (v, u, t, s[, channels]).
+        picture: shape of the image, (rows, columns[, channels]).
+        scale: factor of images, and of samples in the adjoint.
         options: of the physics.
     """
     scale = checks.above_zero("scale", scale, unit="")
@@ -65,11 +65,11 @@ class _Times:
     """A map between tensors, differentiable any number of times.
 
     Args:
-        map: of arrays whose channels come last.
-        what: it takes.
-        shape: of one of them, channels first.
-        coloured: whether the arrays have an axis of channels.
-        scale: by which what it makes is multiplied.
+        map: of arrays, channels last.
+        what: name of the map's input, for messages.
+        shape: of one input, channels first.
+        coloured: whether the arrays have a channel axis.
+        scale: factor of the result.
     """
 
     map: LinearMap
@@ -79,7 +79,7 @@ class _Times:
     scale: float
 
     def __call__(self, tensor: torch.Tensor, **parameters: Any) -> torch.Tensor:
-        """What the map makes of each; parameters are those of the noise, which `deepinv` passes here as well."""
+        """Apply the map to each; ``parameters`` are of the noise, which `deepinv` also passes here."""
         if not isinstance(tensor, torch.Tensor) or not tensor.is_floating_point():
             given = tensor.dtype if isinstance(tensor, torch.Tensor) else type(tensor).__name__
             raise InputError(f"{self.what} are tensors of floating-point numbers here, not {given}")
@@ -97,11 +97,11 @@ class _Times:
         return made if self.scale == 1 else made * self.scale
 
     def __deepcopy__(self, memo: dict[int, Any]) -> _Times:
-        return self  # nothing of it ever changes
+        return self  # immutable
 
 
 class _Product(torch.autograd.Function):  # type: ignore[misc]
-    """A linear map of tensors: its derivative is its adjoint's, and so on."""
+    """A linear map of tensors, whose derivative is the adjoint; differentiable to any order."""
 
     @staticmethod
     def forward(map: LinearMap, tensor: torch.Tensor, coloured: bool) -> torch.Tensor:

@@ -1,1 +1,1 @@
-"""What the demo and the gallery show with: a built-in scene, a bench, figures and pages."""
+"""Shared parts of the demo and the gallery: a built-in scene, a bench, figures and pages."""

@@ -1,4 +1,4 @@
-"""Drawings: close-ups side by side, views, masks, a contact sheet."""
+"""Figures: close-ups side by side, views, masks, a contact sheet."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ Shown = NDArray[np.float32]
 
 INK, QUIET, ACCENT = "#222222", "#666666", "#D55E00"
 LABEL = 9
-"""Points."""
+"""Size of labels, points."""
 SHEET_WIDTH, HIGHEST_ROW = 15.0, 6.8
 """Of the contact sheet, inches."""
 
 
 @dataclass(frozen=True)
 class Crop:
-    """A square of the upright picture.
+    """A square of the upright image.
 
     Args:
-        row: of its first pixel; may lie outside by rounding, `of` keeps it inside.
+        row: of its first pixel; may lie outside because of rounding, `of` moves it inside.
         column: likewise.
         size: pixels a side.
     """
@@ -48,21 +48,21 @@ class Crop:
     size: int
 
     def of(self, shown: Shown) -> Shown:
-        """The square cut out of a picture (rows, columns, ...)."""
+        """The square cut out of an image (rows, columns, ...)."""
         row = min(max(self.row, 0), shown.shape[0] - self.size)
         column = min(max(self.column, 0), shown.shape[1] - self.size)
         return shown[row : row + self.size, column : column + self.size]
 
 
 def crop_around(sensor: Sensor, place: tuple[float, float, float], size: int) -> Crop:
-    """The square around a point of the scene, as it is seen through the middle of a lens at z = 0.
+    """The square around a point of the scene, as seen through the middle of a lens at z = 0.
 
     Args:
         sensor: behind the lens.
         place: (X, Y, distance) of the point, metres.
         size: pixels a side.
     """
-    # Upright, the picture runs the way the scene does.
+    # The upright image has the orientation of the scene.
     row, column = (
         (count - 1) / 2 + across / place[2] * sensor.z / pitch
         for across, count, pitch in zip(place[1::-1], sensor.shape, sensor.pitches, strict=True)
@@ -71,16 +71,16 @@ def crop_around(sensor: Sensor, place: tuple[float, float, float], size: int) ->
 
 
 def shown(image: Image, exposure: float) -> Shown:
-    """A picture as screens want it: upright, exposed, sRGB, (rows, columns, 3), 0 to 1."""
+    """An image for display: upright, exposed, sRGB, (rows, columns, 3), 0 to 1."""
     return values_shown(image.upright().to_numpy(), 1 / exposure)
 
 
 def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
-    """Upright values of linear light as screens want them: (rows, columns, 3), 0 to 1, sRGB.
+    """Upright values of linear light for display: (rows, columns, 3), 0 to 1, sRGB.
 
     Args:
         upright: (rows, columns[, channels]).
-        white: the value that is shown white.
+        white: the value shown as white.
     """
     values = np.asarray(upright, dtype=np.float32) * np.float32(1 / white)
     coded = np.clip(transfer.from_linear(np.clip(values, 0, 1)), 0, 1)
@@ -90,17 +90,17 @@ def values_shown(upright: NDArray[Any], white: float = 1.0) -> Shown:
 
 
 def grey_shown(picture: NDArray[Any]) -> Shown:
-    """A grey picture as screens want it, by the plain power law of 2.2: (rows, columns), 0 to 1."""
+    """A grey image for display, by a gamma of 2.2: (rows, columns), 0 to 1."""
     return np.asarray(np.clip(picture, 0, 1).astype(np.float32) ** np.float32(1 / 2.2))
 
 
 def view_shown(light_field: LightField, row: int, column: int) -> Shown:
-    """One view as screens want it; radiance 1 is white."""
+    """One view for display; radiance 1 is white."""
     return shown(light_field.view(row, column), 1.0)
 
 
 def slice_shown(light_field: LightField, view_row: int, pixel_row: int) -> Shown:
-    """The slice of all views of a row and one row of pixels, as screens want it: (views, columns, 3)."""
+    """The slice through all views of a row along one row of pixels, for display: (views, columns, 3)."""
     values = to_numpy(light_field.values[view_row, :, pixel_row]).astype(np.float32)
     return values_shown(values, light_field.full_scale)
 
@@ -109,7 +109,7 @@ def detailed_crops(pictures: Sequence[Shown], size: int) -> list[Crop]:
     """For each picture, the square that is sharp in it and not in the others.
 
     Args:
-        pictures: of the same scene, each focused elsewhere, all of one shape.
+        pictures: of the same scene at different focus, all of one shape.
         size: of the squares, pixels.
     """
     from scipy.ndimage import uniform_filter
@@ -124,10 +124,10 @@ def detailed_crops(pictures: Sequence[Shown], size: int) -> list[Crop]:
 
 
 def _detail(picture: Shown, smooth: Any, size: int) -> Any:
-    """How much fine structure the square around each pixel holds; none near the border."""
+    """The amount of fine detail in the square around each pixel; 0 near the border."""
     grey = picture.mean(axis=2)
     fine = (grey - smooth(grey, 5)) ** 2
-    energy = np.sqrt(np.maximum(smooth(fine, size), 0))  # running sums leave rounding of either sign
+    energy = np.sqrt(np.maximum(smooth(fine, size), 0))  # running sums leave small errors of either sign
     half = size // 2 + 1
     inside = np.zeros_like(energy)
     inside[half:-half, half:-half] = energy[half:-half, half:-half]
@@ -135,25 +135,25 @@ def _detail(picture: Shown, smooth: Any, size: int) -> Any:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """A figure, inches, that no global state knows of."""
+    """A figure, inches, independent of pyplot."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), dpi=110, layout="constrained", facecolor="white")
 
 
 def write_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, whole or not at all."""
+    """Write a figure as PNG, completely or not at all."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary, facecolor="white")
 
 
 def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows: Sequence[str]) -> Figure:
-    """Squares of several pictures, magnified without smoothing: a column a picture, a row a place.
+    """Magnified squares of several pictures without smoothing: a column per picture, a row per place.
 
     Args:
         columns: title and picture.
         crops: the places.
-        rows: what is to be seen at each.
+        rows: labels of the places.
     """
     figure = new_figure(2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35)
     pictures = [
@@ -165,12 +165,12 @@ def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows:
 
 
 def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[str] = (), **options: Any) -> None:
-    """Pictures on a grid of axes, each below its title.
+    """Put pictures on a grid of axes, each below its title.
 
     Args:
         grid: of axes, (rows, columns).
-        rows: titles and pictures; a row that is shorter than the grid's leaves the last of its places empty.
-        labels: what stands to the left of the rows.
+        rows: titles and pictures; places at the end of a shorter row stay empty.
+        labels: to the left of the rows.
         options: of `put`.
     """
     for line, row in zip(grid, rows, strict=True):
@@ -183,7 +183,7 @@ def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[
 
 
 def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:
-    """A picture on axes without ticks, pixels kept square and sharp."""
+    """Put a picture on axes without ticks; pixels stay square and sharp."""
     image = axes.imshow(picture, interpolation="nearest", **options)
     axes.set_xticks([])
     axes.set_yticks([])
@@ -221,10 +221,10 @@ PARALLEL, NEAR_POINT = (0.1, 0.5, 1.0), (1.0, 0.4, 0.05)
 
 
 def points_figure(camera: Camera, width: float) -> Figure:
-    """Two points of light in phase space on their way through a camera, with a key.
+    """The light of two points in phase space through the stages of a camera, with a key.
 
     Args:
-        camera: one lens, focused on what is infinitely far away.
+        camera: one lens, focused at infinity.
         width: of the lens, metres.
     """
     focal_length = camera.sensor.z
@@ -239,12 +239,12 @@ def points_figure(camera: Camera, width: float) -> Figure:
 
 
 def points_field(focal_length: float, width: float) -> LightField:
-    """Two points of light as 41 views in a row see them: one infinitely far and off the axis, one near on it.
+    """Two points of light in 41 views in a row: one at infinity off the axis, one near on the axis.
 
-    The near one is four focal lengths away and orange, the far one blue: the paper's parallel light.
+    The near point is four focal lengths away and orange, the far one blue: the paper's parallel light.
 
     Args:
-        focal_length: of the lens before which it is to stand, metres.
+        focal_length: of the lens behind the light field, metres.
         width: of the row of views, metres.
     """
     views, pixels, distance = 41, 301, 4 * focal_length
@@ -259,7 +259,7 @@ def points_field(focal_length: float, width: float) -> LightField:
 
 
 def mask_figure(masks: Sequence[tuple[str, Any]], width: float) -> Figure:
-    """What masks transmit, on the part that light on its way to the sensor crosses.
+    """The transmission of masks, on the part that light to the sensor crosses.
 
     Args:
         masks: title and mask.
@@ -295,7 +295,6 @@ class SheetRow:
         title: a line above it.
         text: a line below that, smaller.
         pictures: title and file of each.
-        heights: of the row, inches.
     """
 
     title: str
@@ -308,7 +307,7 @@ def contact_sheet(title: str, rows: Sequence[SheetRow]) -> Figure:
 
     Args:
         title: of the sheet.
-        rows: what it shows.
+        rows: from top to bottom.
     """
     pictures = [[_read(path) for _, path in row.pictures] for row in rows]
     ratios = [[picture.shape[1] / picture.shape[0] for picture in row] for row in pictures]

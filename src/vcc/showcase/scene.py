@@ -1,8 +1,8 @@
-"""The demo's own scene: leaves before a test chart before a town at dusk, all of it procedural.
+"""The demo's own scene: leaves before a test chart before a town at dusk, fully procedural.
 
-Three planes at three distances, so that one picture shows depth of field (leaves, chart and town are never
-sharp together), occlusion (leaves over chart over town), detail down to a pixel (the chart's star, bars and
-letters) and the shape of the aperture (each lamp of the town, out of focus, is a picture of it).
+It has three planes at three distances, so that one image shows depth of field (leaves, chart and town are
+never sharp together), occlusion (leaves over chart over town), detail down to a pixel (the chart's star, bars
+and letters) and the shape of the aperture (each lamp of the town, out of focus, is an image of it).
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ PLACES = {
     "the chart's star": (-0.046, 0.030, MIDDLE),
     "lamps of the town": (0.48, -0.335, FAR),
 }
-"""Places worth a close look: (X, Y, distance), metres."""
+"""Places for close-ups: (X, Y, distance), metres."""
 CHECK_PLACES = {
     "star": (-0.054, 0.026, MIDDLE),
     "letters": (0.068, 0.120, MIDDLE),
     "leaf": (-0.150, -0.020, NEAR),
 }
-"""Others, of fine print and fine edges."""
+"""Further places, with fine print and fine edges."""
 
 
 def demo_scene() -> PlanesScene:
@@ -50,7 +50,7 @@ def demo_scene() -> PlanesScene:
 
 @dataclass(frozen=True)
 class Foliage:
-    """Two twigs with leaves, clear between them; made for a distance of 0.8 m."""
+    """Two twigs with leaves, transparent between them; made for a distance of 0.8 m."""
 
     edge: float = 0.5 * mm
 
@@ -100,7 +100,7 @@ class Foliage:
             opacity = soft((half - np.abs(b)) * length, self.edge)
             opacity = opacity * soft(
                 np.minimum(a, 1 - a) * length - self.edge, self.edge
-            )  # no hair beyond the tip
+            )  # no thin line beyond the tip
             vein = np.exp(-((b / 0.012) ** 2)) + 0.45 * np.exp(
                 -((np.sin(26 * (a - 0.75 * np.abs(b))) / 0.16) ** 2)
             )

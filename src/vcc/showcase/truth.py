@@ -1,4 +1,4 @@
-"""The paper's own check: a simulated pinhole picture against what a pinhole there truly sees."""
+"""The paper's own check: a simulated pinhole image against the true one."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from vcc.showcase.bench import Bench
 POINTS = 4
 """Points across a pixel at which the truth is evaluated, each way."""
 BORDER = 0.03
-"""Share of the picture at each side that PSNR leaves out: there the views end."""
+"""Share of the image at each side that PSNR excludes, because the views end there."""
 
 
 def true_picture(bench: Bench) -> Image:
-    """What the bench's pinhole camera would record of the true scene, as light lands on the sensor.
+    """The image that the bench's pinhole camera would record of the true scene, in the orientation of the sensor.
 
     With the demo's scene: its closed form along the ray from each of 4×4 points of each pixel through the
-    pinhole, averaged. Neither the light field nor the engine has a part in it. With someone's own light field
-    there is no truth between its samples: then a cubic spline through the samples of the view at the pinhole
-    takes its place, averaged over each pixel likewise.
+    pinhole, averaged. This uses neither the light field nor the engine. The truth between the samples of
+    other light fields is unknown. There a cubic spline through the samples of the view at the pinhole
+    replaces it, averaged over each pixel likewise.
 
     Returns:
         Irradiance, radiance × steradian: the mean radiance times the pinhole's solid angle.
@@ -76,7 +76,7 @@ def _spline(light_field: LightField, view: tuple[int, int], s: NDArray[np.float6
 
 
 def psnr(picture: Image, truth: Image, white: float) -> float:
-    """How close a picture comes (`vcc.base.measures.psnr`), decibels; its borders left out.
+    """The PSNR of an image (`vcc.base.measures.psnr`), decibels, without its borders.
 
     Args:
         picture: irradiance.

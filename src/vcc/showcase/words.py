@@ -1,8 +1,8 @@
-"""Prose with numbers in it: templates in Jinja2, and lengths and times as people read them.
+"""Prose with numbers: Jinja2 templates, and readable lengths and times.
 
-Templates lie beside the code that uses them, named from the package's folder: ``gallery/plenoptic.txt``. In them
-``{{ length(metres) }}`` and ``{{ away(distance) }}`` are those of here, and ``{{ number | fmt(".1%") }}`` is
-Python's ``format``. Values are escaped for HTML.
+Templates are stored next to the code that uses them, and named from the package's folder:
+``gallery/plenoptic.txt``. In them ``{{ length(metres) }}`` and ``{{ away(distance) }}`` are the functions of
+this module, and ``{{ number | fmt(".1%") }}`` is Python's ``format``. Values are escaped for HTML.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ PACKAGE = Path(__file__).parents[1]
 
 
 def length(metres: float) -> str:
-    """A length as people read it, three digits."""
+    """A length as readable text, three digits."""
     return short(metres, digits=3).replace("um", "µm")
 
 
 def away(distance: float) -> str:
-    """A distance of the scene as people read it."""
+    """A distance of the scene as readable text."""
     if math.isinf(distance):
         return "at infinity"
     return f"{distance:.3g} m away" if distance >= 0.1 else f"{length(distance)} away"
 
 
 def duration(seconds: float | None) -> str:
-    """A time as people read it: 35 ms, 1.8 s; a dash for None."""
+    """A time as readable text: 35 ms, 1.8 s; a dash for None."""
     if seconds is None:
         return "–"
     if seconds < 0.9995:
@@ -44,23 +44,23 @@ def duration(seconds: float | None) -> str:
 
 
 def filled(template: str, **values: Any) -> str:
-    """A template with its values, HTML.
+    """A template filled with values, as HTML.
 
     Args:
         template: its file, named from the package's folder.
-        values: what it speaks of; a name that it asks for and that is not given is an error.
+        values: for the names in the template; a missing one is an error.
     """
     return _environment().get_template(template).render(**values)
 
 
 def write_page(path: Path, template: str, **values: Any) -> None:
-    """Write a template with its values, whole or not at all."""
+    """Write a template filled with values, completely or not at all."""
     with atomic_path(path) as temporary:
         temporary.write_text(filled(template, **values), encoding="utf-8")
 
 
 def paragraphs(template: str, **values: Any) -> str:
-    """A template of paragraphs, which empty lines part, as HTML: each in ``<p>`` and on one line."""
+    """A template of paragraphs separated by empty lines, as HTML: each in ``<p>`` and on one line."""
     texts = re.split(r"\n\s*\n", filled(template, **values).strip())
     return "\n".join(f"<p>{' '.join(text.split())}</p>" for text in texts)
 

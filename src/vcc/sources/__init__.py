@@ -1,4 +1,4 @@
-"""Where light fields come from when no camera took them."""
+"""Synthetic light fields: planar scenes, depth maps, meshes and renderers."""
 
 from vcc.sources.blender import blender_script
 from vcc.sources.depth_map import DepthMapScene

@@ -1,14 +1,14 @@
-"""A script that renders the views of a light field in the user's own Blender, 3.6 to 5.x.
+"""A script that renders the views of a light field in a local Blender, 3.6 to 5.x.
 
     blender scene.blend --background --python views.py
 
-The script needs nothing but Blender. It renders what the scene's camera sees, from a planar array of pinholes
-around that camera's place, each picture shifted and none turned, into a folder that `vcc.open_light_field` reads:
-``input_CamNNN.exr`` (linear) or ``.png`` (sRGB, 16 bits), and ``parameters.cfg`` in the form of the 4D light-field
-benchmark of HCI (Honauer et al. 2016) with the true geometry.
+The script needs only Blender. It renders the view of the scene's camera from a planar array of pinholes around
+the camera's position, with shifted, unrotated images, into a folder that `vcc.open_light_field` reads:
+``input_CamNNN.exr`` (linear) or ``.png`` (sRGB, 16 bits), and ``parameters.cfg`` in the format of the HCI 4D
+light field benchmark (Honauer et al. 2016) with the true geometry.
 
-A picture's middle direction (a, b), as tangents to the right and downwards, is reached by Blender's lens shift in
-units of the picture's width: shift_x = a / (right − left), shift_y = −b / (right − left), for sensor_fit
+The central direction (a, b) of an image, as tangents to the right and downwards, is set by Blender's lens shift
+in units of the image width: shift_x = a / (right − left), shift_y = −b / (right − left), for sensor_fit
 HORIZONTAL.
 """
 
@@ -27,7 +27,7 @@ PictureFormat = Literal["exr", "png"]
 Engine = Literal["as in the file", "cycles", "eevee"]
 
 _FOCAL_LENGTH: Final = 50 * mm
-"""Of the pinhole cameras as Blender and parameters.cfg state them; only its ratio to the sensor matters."""
+"""Focal length of the pinhole cameras in Blender and parameters.cfg; only its ratio to the sensor size matters."""
 
 
 def blender_script(
@@ -39,23 +39,23 @@ def blender_script(
     samples: int | None = None,
     camera: str | None = None,
 ) -> str:
-    """The text of a Python script that makes Blender render the views of an array of cameras.
+    """Return a Python script that renders the views of a camera array in Blender.
 
     Args:
-        cameras: the array. One spacing and square pixels: ``parameters.cfg`` has no words for others.
-        folder: where the views go; relative to the .blend file's folder, or to where Blender was started if the
-            scene is in no file.
-        picture_format: ``"exr"`` keeps linear radiance as 16-bit floating point; ``"png"`` is sRGB with 16 bits,
-            without a "filmic" view transform, and cut at radiance 1.
-        engine: what renders; ``"eevee"`` finds the name that this Blender has for it.
-        samples: per pixel, for Cycles and EEVEE; None leaves what the file says.
-        camera: name of the camera object whose place and direction are the array's; None takes the scene's camera.
+        cameras: the array, with equal spacings and square pixels: ``parameters.cfg`` does not support others.
+        folder: output folder; relative to the folder of the .blend file, or to the working directory of Blender
+            if the scene is not saved.
+        picture_format: ``"exr"`` stores linear radiance as 16-bit floating point; ``"png"`` is sRGB with 16
+            bits, without a "filmic" view transform, clipped at radiance 1.
+        engine: render engine; ``"eevee"`` uses the name of EEVEE in the installed Blender.
+        samples: samples per pixel for Cycles and EEVEE; None keeps the setting of the file.
+        camera: name of the camera object at the centre of the array; None uses the scene's camera.
 
     Returns:
         Python 3.10 source.
 
     Raises:
-        InputError: spacings or slopes that differ between the axes, or an unusable folder, format, engine or
+        InputError: spacings or slopes that differ between the axes, or an invalid folder, format, engine or
             number of samples.
     """
     (dv, du), (pt, ps) = cameras.spacings, cameras.slopes_per_pixel

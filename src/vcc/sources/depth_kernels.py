@@ -1,4 +1,4 @@
-"""The compiled loops that draw surfaces over a picture's pixels as another pinhole sees them."""
+"""The compiled loops that draw surfaces over an image's pixels as seen by another pinhole."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _compiled = compiled()
 
 @_compiled
 def draw_surface(surface, pinhole, nearest, out):  # type: ignore[no-untyped-def]
-    """Draw a surface of pixels into a picture that keeps what is nearest.
+    """Draw a surface of pixels into an image with a depth test.
 
-    surface, pinhole: as `vcc.sources.depth_map` has them.
-    nearest: (rows, columns) of the picture, the vergence of what it shows, below 0 for nothing. out: its colours.
+    surface, pinhole: see `vcc.sources.depth_map`.
+    nearest: (rows, columns) of the image, vergence of the visible surface, below 0 for none. out: colours.
     """
     quads, vergence, colour, cover = surface
     across, down, offset, scale, place = pinhole
@@ -42,13 +42,13 @@ def draw_surface(surface, pinhole, nearest, out):  # type: ignore[no-untyped-def
                 a, b, d = (0, 1, 2) if half == 0 else (3, 2, 1)
                 area = (h[b] - h[a]) * (g[d] - g[a]) - (h[d] - h[a]) * (g[b] - g[a])
                 if area <= 0:
-                    continue  # seen from behind: something nearer hides it
+                    continue  # seen from behind: hidden by a nearer surface
                 for y in range(first_row, last_row + 1):
                     for x in range(first_column, last_column + 1):
                         weight[1] = ((x - h[a]) * (g[d] - g[a]) - (h[d] - h[a]) * (y - g[a])) / area
                         weight[2] = ((h[b] - h[a]) * (y - g[a]) - (x - h[a]) * (g[b] - g[a])) / area
                         weight[0] = 1 - weight[1] - weight[2]
-                        # a hair more than the triangle, so that no sample falls between two
+                        # slightly larger than the triangle, so that no sample falls between two
                         if weight[0] < -1e-9 or weight[1] < -1e-9 or weight[2] < -1e-9:
                             continue
                         w = 0.0
@@ -70,9 +70,9 @@ def draw_surface(surface, pinhole, nearest, out):  # type: ignore[no-untyped-def
 
 @_compiled
 def fill_gaps(nearest, out):  # type: ignore[no-untyped-def]
-    """Fill what nothing was drawn on from the nearest samples of its row, of the two the farther thing.
+    """Fill empty samples from the nearest samples of their row, using the farther surface of the two sides.
 
-    The last channel, how much of a sample is known, becomes 0 there. Returns how many rows were empty.
+    The last channel, the known fraction of a sample, becomes 0 there. Returns the number of empty rows.
     """
     high, wide = nearest.shape
     empty = 0

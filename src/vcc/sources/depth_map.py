@@ -1,15 +1,15 @@
-"""A light field from one picture and its depth map: surfaces cut where depth jumps, and what is behind made up.
+"""A light field from one image and its depth map: surfaces are cut at depth jumps, and hidden parts are inpainted.
 
-The picture is taken as surfaces over its pixels (a mesh for each, drawn anew for every view; layered depth images,
-Shade et al. 1998):
+The image is converted to surfaces over its pixels (one mesh each), which are drawn for every view (layered
+depth images, Shade et al. 1998):
 
-1. Depth that changes by a jump, and not by a slope, cuts the surface. Mixed pixels along a cut are parted into the
-   colours of the near and the far side and a share of the near one; the outline is where that share is ½, so that
-   it lies between pixels and not along their borders.
-2. Behind the near side of each cut, as far as any view can look, the far side goes on: its depth along its own
-   slope, its picture mirrored at the cut. Beyond the picture's border, likewise: the depth of the border, the
-   picture mirrored.
-3. A view draws all of it, the nearest shown, with several samples a pixel that are then averaged.
+1. A jump in depth, as opposed to a slope, cuts the surface. Mixed pixels along a cut are separated into the
+   colours of the near and the far side and the fraction of the near side; the outline is where this fraction is
+   ½, so it lies between pixels instead of along their borders.
+2. Behind the near side of each cut, as far as any view can see, the far side is extended: its depth along its
+   own slope, its image mirrored at the cut. The border of the image is extended likewise: constant depth, mirrored
+   image.
+3. A view draws all surfaces with a depth test, with several samples per pixel that are then averaged.
 """
 
 from __future__ import annotations
@@ -30,35 +30,34 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _SLOPE_FACTOR = 3.0
-"""A step of depth is a jump where it is this many times the steps beside it, of which the smaller counts."""
+"""A depth step is a jump if it is this many times the smaller of its two neighbouring steps."""
 _WINDOW = 3
-"""Pixels each way in which the clean colours of both sides of a cut are looked for."""
+"""Radius in pixels of the search for unmixed colours of both sides of a cut."""
 
 
 class DepthMapScene:
-    """What one picture and its depth tell about the views around it; a renderer for `vcc.sources.synthesize`.
+    """The views around one image, from its depth map; a renderer for `vcc.sources.synthesize`.
 
-    What the picture does not show is made up, and only looks plausible: `uncovered` says where. Surfaces keep
-    their colour in all directions (nothing shines or mirrors), nothing is half transparent, and behind each edge
-    there is one more surface and not what that one hides. Samples are interpolated linearly, which blurs detail
-    near the pixels' own size.
+    Parts that the image does not show are inpainted to look plausible; `uncovered` returns them. Surfaces are
+    Lambertian (no highlights or mirrors) and opaque, and only one surface is extended behind each edge. Samples
+    are interpolated linearly, which blurs detail near the pixel size.
 
     Args:
-        radiance: the picture, linear, (rows, columns) or (rows, columns, 3), as the pinhole in the middle of the
-            array sees it; row 0 at the top.
+        radiance: the image, linear, (rows, columns) or (rows, columns, 3), as seen by the pinhole at the centre
+            of the array; row 0 at the top.
         depth: distance of each pixel along the axis, metres, (rows, columns); infinite for the sky.
-        slope_per_pixel: pixel pitch over focal length of the picture: one number or (pt, ps).
-        reach: the farthest that a view will be from the middle along either axis, metres; more is made up for a
-            larger one.
-        focus_distance: where the views will converge, metres; infinite for parallel ones. It says how far they
-            look past the picture's border.
-        edge: a jump in depth is cut where it would be torn by so many pixels in a view at ``reach``.
-        supersampling: samples each way that are averaged for one pixel of a view.
+        slope_per_pixel: pixel pitch over focal length of the image: one number or (pt, ps).
+        reach: maximum distance of a view from the centre along either axis, metres; a larger reach needs more
+            inpainting.
+        focus_distance: distance at which the views will converge, metres; infinite for parallel views. It
+            determines how far views see past the border of the image.
+        edge: a jump in depth is cut if it opens a gap of at least this many pixels in a view at ``reach``.
+        supersampling: samples along each axis that are averaged for one pixel of a view.
 
     Raises:
-        InputError: shapes that do not fit, radiance that is negative or not finite, a depth that is 0 or less or
-            no number, a slope, reach, focus distance or edge that is not above 0, or a scene so near that a view
-            would need more than four times the picture.
+        InputError: shapes that do not match, radiance that is negative or not finite, a depth that is 0,
+            negative or NaN, a slope, reach, focus distance or edge that is not above 0, or a scene so near that
+            a view would need more than four times the image.
     """
 
     def __init__(
@@ -115,19 +114,19 @@ class DepthMapScene:
     def for_cameras(
         cls, radiance: ArrayLike, depth: ArrayLike, cameras: CameraArray, **options: Any
     ) -> DepthMapScene:
-        """A scene for an array whose middle took the picture, with its slope per pixel and its reach.
+        """A scene for an array whose central camera took the image, with the array's slope per pixel and extent.
 
         Args:
             radiance: see the class.
             depth: see the class.
-            cameras: the array; a converging one shows the middle of the picture in each view.
-            options: of the class.
+            cameras: the array; in a converging array, each view shows the centre of the image.
+            options: further arguments of the class.
 
         Raises:
-            InputError: see the class.
+            InputError: as in the class.
         """
         extents = [(n - 1) / 2 * d for n, d in zip(cameras.views, cameras.spacings, strict=True)]
-        reach = max(*extents, 1e-3 * min(cameras.spacings))  # one view alone has no reach
+        reach = max(*extents, 1e-3 * min(cameras.spacings))  # a single view has no extent
         return cls(
             radiance,
             depth,
@@ -146,11 +145,11 @@ class DepthMapScene:
         Args:
             radiance: see the class.
             disparity: (rows, columns).
-            cameras: the array that the disparities are of.
-            options: of the class.
+            cameras: the array to which the disparities refer.
+            options: further arguments of the class.
 
         Raises:
-            InputError: disparities of things beyond infinity, or see the class.
+            InputError: disparities of objects beyond infinity, or as in the class.
         """
         vergence = (
             np.asarray(disparity, dtype=np.float64) * cameras.slopes_per_pixel[1] / cameras.spacings[1]
@@ -166,7 +165,7 @@ class DepthMapScene:
             return cls.for_cameras(radiance, 1 / vergence, cameras, **options)
 
     def description(self) -> dict[str, Any]:
-        """All that the pictures depend on but the cameras; picture and depth map by their SHA-256."""
+        """Everything that the images depend on except the cameras; image and depth map by their SHA-256."""
         digest = hashlib.sha256(np.ascontiguousarray(self._picture).tobytes())
         digest.update(np.ascontiguousarray(self._vergence).tobytes())
         return {
@@ -181,24 +180,24 @@ class DepthMapScene:
         }
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The picture of one view.
+        """Render the image of one view.
 
         Args:
-            camera: where it is and where it looks.
+            camera: position and viewing direction of the view.
 
         Returns:
             Linear radiance, (rows, columns, 3), row 0 at the top.
 
         Raises:
-            InputError: a camera beyond the reach, or one that looks past what the picture shows.
+            InputError: a camera beyond the reach, or one that looks past the extended image.
         """
         return np.ascontiguousarray(self._drawn(camera)[..., :3])
 
     def uncovered(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The share of each pixel of a view that was made up, 0 to 1, (rows, columns).
+        """The fraction of each pixel of a view that was inpainted, 0 to 1, (rows, columns).
 
         Raises:
-            InputError: as `render`.
+            InputError: as in `render`.
         """
         return np.asarray(1 - self._drawn(camera)[..., 3])
 
@@ -256,13 +255,13 @@ class DepthMapScene:
 
 
 class _Surface(NamedTuple):
-    """A mesh over the pixels of the picture with its margin.
+    """A mesh over the pixels of the image with its margin.
 
     Args:
-        quads: (rows − 1, columns − 1), whether the four pixels from (r, c) on span a piece of it.
+        quads: (rows − 1, columns − 1), whether the four pixels from (r, c) on span a part of the surface.
         vergence: (rows, columns), 1 / distance.
-        colour: (rows, columns, 4): red, green, blue, and 1 where the picture shows it, 0 where it was made up.
-        cover: (rows, columns), interpolated; where it is below ½ the surface is not there.
+        colour: (rows, columns, 4): red, green, blue, and 1 for pixels of the image, 0 for inpainted ones.
+        cover: (rows, columns), interpolated; the surface is absent where it is below ½.
     """
 
     quads: Mask
@@ -272,14 +271,14 @@ class _Surface(NamedTuple):
 
 
 class _Pinhole(NamedTuple):
-    """Where a view shows things: at column offset[0] + scale[0] · (across − place[0] · vergence), rows likewise.
+    """Projection of a view: column offset[0] + scale[0] · (across − place[0] · vergence), rows likewise.
 
     Args:
-        across: (columns,), tangents of the directions of the picture's columns, as its own pinhole sees them.
-        down: (rows,), of its rows.
-        offset: (column, row) of the direction 0.
-        scale: columns and rows for a tangent of 1.
-        place: (x, y) of the view, metres from the picture's own.
+        across: (columns,), direction tangents of the image's columns, seen from the image's own pinhole.
+        down: (rows,), likewise for its rows.
+        offset: (column, row) of direction 0.
+        scale: columns and rows per unit of the tangent.
+        place: (x, y) of the view, metres from the image's own pinhole.
     """
 
     across: Array
@@ -297,8 +296,8 @@ def _surfaces(
     reach: float,
     edge: float,
 ) -> list[_Surface]:
-    """The visible surface, the near side's outlines, and what goes on behind."""
-    # vergence in pixels by which a view at ``reach`` sees things displaced
+    """The visible surface, the outlines of near sides, and the extensions behind them."""
+    # vergence in pixels of displacement in a view at ``reach``
     unit = reach / min(slopes)
     parallax = _without_mixed_depths(vergence * unit, edge)
     border = ((margin[0],) * 2, (margin[1],) * 2)
@@ -320,14 +319,15 @@ def _surfaces(
     clean[far_at_cut] = far_colour[far_at_cut]
     visible = _Surface(~torn, parallax / unit, _with_known(clean, known), full)
 
-    # The near side's outline: its pieces at cuts, over the far side's pixels too, seen where its share is ½.
+    # Outline of the near side: its parts at cuts, also over the far side's pixels, visible where its fraction
+    # is ≥ ½.
     row, column = distance_transform_edt(~near_at_cut, return_distances=False, return_indices=True)
     outline_parallax = np.where(far_at_cut, parallax[row, column], parallax)
     outline_colour = np.where(far_at_cut[..., None], near_colour, clean)
     outline = _Surface(torn, outline_parallax / unit, _with_known(outline_colour, known), share.astype(np.float32))
     surfaces = [visible, outline]
-    # Small cuts within a near thing must not keep what is behind its outline from going on: once for all cuts,
-    # once for those of more than 4 times the least jump, and so on; the nearest of what they give is seen.
+    # Small cuts within a near object must not stop the extension behind its outline: extend once for all cuts,
+    # once for cuts of more than 4 times the smallest jump, and so on; the depth test picks the nearest result.
     jump = np.where(far_at_cut, nearer - parallax, 0)
     least = edge
     while (far := far_at_cut & (jump >= least)).any():
@@ -346,7 +346,7 @@ def _steps(values: Array, axis: int) -> Array:
 
 
 def _without_mixed_depths(parallax: Array, edge: float) -> Array:
-    """Depths between those of the two sides of an edge, as smoothed maps have them, given to one of the two."""
+    """Assign depths between the two sides of an edge, as in smoothed maps, to one of the sides."""
     result = parallax.copy()
     for axis in (0, 1):
         values = np.moveaxis(result, axis, 0)
@@ -368,12 +368,12 @@ def _jumps(parallax: Array, axis: int, edge: float) -> Mask:
     before = np.concatenate([step[:1] * 0, step[:-1]])
     after = np.concatenate([step[1:], step[:1] * 0])
     jump = (step > edge) & (step > _SLOPE_FACTOR * np.minimum(before, after))
-    # The rim of a round thing is steep right behind its outline: a small step beside a large one is no jump.
+    # The rim of a round object is steep next to its outline: a small step next to a large one is not a jump.
     return np.moveaxis(jump & (step > np.maximum(before, after) / 4), 0, axis)
 
 
 def _quads_with(cuts: list[Mask]) -> Mask:
-    """The squares of four pixels that a cut goes through."""
+    """The squares of four pixels that contain a cut."""
     rows, columns = cuts
     return np.asarray(rows[:, :-1] | rows[:, 1:] | columns[:-1] | columns[1:])
 
@@ -384,7 +384,7 @@ def _corners(shape: tuple[int, ...]) -> list[tuple[slice, slice]]:
 
 
 def _sides(parallax: Array, torn: Mask) -> tuple[Mask, Mask, Array, Array]:
-    """Pixels on the near and on the far side of torn squares; the depths of both sides there, as parallax."""
+    """Pixels on the near and on the far side of cut squares, and the depths of both sides there, as parallax."""
     nearer, farther = np.full(parallax.shape, -np.inf), np.full(parallax.shape, np.inf)
     corners = _corners(parallax.shape)
     high = np.max([parallax[corner] for corner in corners], axis=0)
@@ -400,10 +400,10 @@ def _sides(parallax: Array, torn: Mask) -> tuple[Mask, Mask, Array, Array]:
 def _parted(
     colour: Array, parallax: Array, near: Mask, far: Mask, nearer: Array, farther: Array
 ) -> tuple[Array, Array, Array]:
-    """Of pixels at cuts: the share of the near side, and the colours of both sides, from clean pixels close by.
+    """In pixels at cuts, the near side's fraction and the colours of both sides, from unmixed pixels nearby.
 
-    A mixed pixel is share·near + (1 − share)·far; the depth map says to which side it belongs, hence on which side
-    of ½ its share lies. What is hardly mixed keeps its own colour, and with it its texture.
+    A mixed pixel is fraction·near + (1 − fraction)·far. The depth map assigns the pixel to a side, and thereby
+    its fraction to one side of ½. Pixels that are hardly mixed keep their own colour, and so their texture.
     """
     rows, columns = np.nonzero(near | far)
     sums = np.zeros((2, len(rows), 3))
@@ -414,7 +414,7 @@ def _parted(
         for c in range(-_WINDOW, _WINDOW + 1):
             y, x = np.clip(rows + r, 0, len(near) - 1), np.clip(columns + c, 0, near.shape[1] - 1)
             value = parallax[y, x]
-            # closer ones count more, clean ones far more; those of a third surface belong to neither side
+            # nearby pixels count more, unmixed ones far more; those of a third surface belong to neither side
             weight = np.exp(-(r * r + c * c) / 4) * np.where(mixed[y, x], 1e-6, 1.0)
             is_near = value > middle
             other = np.where(is_near, nearer[rows, columns], farther[rows, columns])
@@ -428,7 +428,7 @@ def _parted(
     strength = (contrast**2).sum(axis=-1)
     mix = ((own - sides[1]) * contrast).sum(axis=-1) / np.maximum(strength, 1e-12)
     on_near = near[rows, columns]
-    mix = np.where(strength > 1e-6, mix, on_near)  # no contrast, nothing to tell by
+    mix = np.where(strength > 1e-6, mix, on_near)  # without contrast, use the depth map
     mix = np.where(on_near, np.clip(mix, 0.5, 1), np.clip(mix, 0, 0.5))
     share = near.astype(np.float64)
     share[rows, columns] = mix
@@ -442,14 +442,14 @@ def _parted(
 def _hidden(
     parallax: Array, colour: Array, known: Array, far: Mask, near: Mask, edge: float
 ) -> tuple[Mask, Array, NDArray[np.float32]]:
-    """What goes on behind near things: the squares of it, its parallax and its colours, all made up."""
+    """The extension behind near objects: its squares, parallax and colours, all inpainted."""
     from scipy.ndimage import distance_transform_edt, gaussian_filter
 
     distance, nearest = distance_transform_edt(~far, return_indices=True)
     rows, columns = np.indices(parallax.shape)
     at = parallax[nearest[0], nearest[1]]
     covered = parallax - at > edge
-    # It can be seen as far as the near thing moves against it, in both directions at once.
+    # It is visible as far as the near object moves against it, in both directions at once.
     hidden = covered & (distance <= math.sqrt(2) * (parallax - at) + 3)
     mirrored = (
         np.clip(2 * nearest[0] - rows, 0, parallax.shape[0] - 1),
@@ -457,16 +457,16 @@ def _hidden(
     )
     there = parallax[mirrored]
     same = np.abs(there - at) < np.maximum(edge, 0.1 * distance)
-    # A straight slope goes on as a straight slope, and never comes before what hides it.
+    # A straight slope continues straight, but never in front of the occluding surface.
     going_on = np.where(same, 2 * at - there, at)
     going_on = np.clip(going_on, parallax.min(), np.maximum(parallax - edge / 2, parallax.min()))
     made_up = np.where(same[..., None], colour[mirrored], colour[nearest[0], nearest[1]])
 
-    own = far | ((distance <= 2) & ~covered & ~near)  # it joins what is seen
+    own = far | ((distance <= 2) & ~covered & ~near)  # the extension joins the visible surface
     values = np.where(own, parallax, going_on)
     colours = np.where(own[..., None], colour, made_up)
     there_is = own | hidden
-    # Neighbours may be mirrored at different pixels of a curved outline: even out their grain, within a surface.
+    # Neighbours may be mirrored at different pixels of a curved outline: smooth the noise within a surface.
     weight = np.maximum(gaussian_filter(there_is.astype(np.float64), 1.0, truncate=2), 1e-9)
 
     def mean(quantity: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The compiled loop that turns prefiltered textures into views."""
+"""The compiled loop that computes views from prefiltered textures."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _compiled = compiled(fastmath=_FAST)
 def views_of_row(rasters, down, across, row, scale, top, out):  # type: ignore[no-untyped-def]
     """Fill one row of views: out[i, l, k, c], planes nearest first.
 
-    rasters: (planes, rows, phases, 4, columns), opaque-weighted red, green, blue and opacity; raster column m
-    of a plane is kept as phase m % phases at m // phases, so that a view reads contiguous numbers.
-    down, across: where pixel 0 of each row and column of views lies in the raster, as (point, share of the next
-    point), (planes, views) each. row: of views.
-    scale, top: a value v is stored as v · scale, cut at top; rounded where out holds integers (½ is added,
-    the conversion truncates).
+    rasters: (planes, rows, phases, 4, columns), red, green and blue multiplied by opacity, and opacity; column
+        m of a plane is stored as phase m % phases at m // phases, so that a view reads contiguous numbers.
+    down, across: position of pixel 0 of each row and column of views in the raster, as (point, weight of the
+        next point), shape (planes, views) each. row: row of views.
+    scale, top: a value v is stored as v · scale, clipped at top; rounded if out has integers (½ is added, the
+        conversion truncates).
     """
     planes, _, phases, _, width = rasters.shape
     (row_point, row_share), (column_point, column_share) = down, across

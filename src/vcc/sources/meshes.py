@@ -1,4 +1,4 @@
-"""Triangle meshes from files: glTF, OBJ and PLY, read by trimesh, as triangles with what OpenGL needs of them."""
+"""Triangle meshes from files (glTF, OBJ and PLY, read by trimesh), prepared for OpenGL."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vcc.base.reading import check_file, expanded, is_file, read_bytes, reading
 from vcc.files.transfer import to_linear
 
 MESH_ENDINGS = (".glb", ".gltf", ".obj", ".ply")
-"""The endings of the files that are read."""
+"""Supported file extensions."""
 
 _COSINE_OF_CREASE = math.cos(math.radians(30))
 
@@ -28,16 +28,16 @@ class Part(Brief):
     """Triangles that share a material, in the array's coordinates."""
 
     corners: NDArray[np.float32]
-    """(3 · triangles, 12): position, normal, texture place (0 to 1, v upwards), linear colour with opacity."""
+    """(3 · triangles, 12): position, normal, texture coordinates (0 to 1, v up), linear colour with opacity."""
     texture: NDArray[np.float16] | None
     """(rows, columns, 4), linear, bottom row first."""
     cutoff: float
-    """Opacity below which nothing is drawn."""
+    """Opacity below which a fragment is discarded."""
     two_sided: bool
 
 
 def loaded(meshes: Any) -> tuple[list[str], list[Any]]:
-    """Names, and trimesh scenes with where they came from (file ending or "")."""
+    """Return names and trimesh scenes; the scenes' metadata contain the file extension."""
     with checks.package("reading meshes", "trimesh", "opengl"):
         import trimesh
     given = list(meshes) if isinstance(meshes, list | tuple) else [meshes]
@@ -76,7 +76,7 @@ def _read(path: Path) -> Any:
 
 
 def _check_materials(path: Path) -> None:
-    """Refuse an OBJ whose material file or pictures are missing: it would be drawn grey without a word."""
+    """Raise for an OBJ with missing material files or pictures: trimesh would silently load it as grey."""
     for library in _named_in(path, "mtllib"):
         if not is_file(library):
             raise InputError(f"{path} names the material file {library.name}, which is not beside it")
@@ -86,7 +86,7 @@ def _check_materials(path: Path) -> None:
 
 
 def _text(path: Path) -> str:
-    """The text of an OBJ or of its materials; of other codes trimesh makes a guess, or asks for a package."""
+    """The text of an OBJ or material file in UTF-8; for other encodings trimesh guesses or needs a package."""
     try:
         return read_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:
@@ -108,7 +108,7 @@ def _named_in(path: Path, word: str) -> list[Path]:
 
 
 def parts_of(scenes: Sequence[Any], array_from_scene: NDArray[np.float64]) -> list[Part]:
-    """The triangles of scenes, material by material, in the array's coordinates."""
+    """The triangles of scenes, one part per mesh, in the array's coordinates."""
     import trimesh
 
     parts = []
@@ -125,12 +125,12 @@ def parts_of(scenes: Sequence[Any], array_from_scene: NDArray[np.float64]) -> li
 def _part(mesh: Any, to_array: NDArray[np.float64], linear_colours: bool) -> Part:
     faces = np.asarray(mesh.faces)
     positions = np.asarray(mesh.vertices) @ to_array[:3, :3].T + to_array[:3, 3]
-    if "vertex_normals" in mesh._cache:  # the file states them
+    if "vertex_normals" in mesh._cache:  # the file states normals
         normals = np.asarray(mesh.vertex_normals) @ np.linalg.inv(to_array[:3, :3])
         normals = (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30))[faces]
     else:
         normals = _normals_of_corners(positions, faces)
-    if np.linalg.det(to_array[:3, :3]) > 0:  # the array's axes are left-handed: the usual case is below 0
+    if np.linalg.det(to_array[:3, :3]) > 0:  # the array's axes are left-handed: usually below 0
         faces, normals = faces[:, ::-1], normals[:, ::-1]
     corner, normals = faces.ravel(), normals.reshape(-1, 3)
     places = np.zeros((len(positions), 2))
@@ -159,21 +159,21 @@ def _part(mesh: Any, to_array: NDArray[np.float64], linear_colours: bool) -> Par
 
 
 def _normals_of_corners(positions: NDArray[np.float64], faces: NDArray[Any]) -> NDArray[np.float64]:
-    """Normals (triangles, 3, 3) of a surface that states none: smooth, but sharp at creases of 30° and more.
+    """Normals (triangles, 3, 3) for a surface without normals: smooth, but sharp at creases of 30° and more.
 
-    A corner has the mean normal, by area, of those triangles at its place that are within 30° of its own.
+    A corner gets the area-weighted mean normal of the triangles at its position that are within 30° of its own.
     """
     first, second, third = (positions[faces[:, n]] for n in range(3))
     by_area = np.cross(second - first, third - first)
     unit = by_area / np.maximum(np.linalg.norm(by_area, axis=1, keepdims=True), 1e-30)
-    # Vertices are doubled along seams of textures: what counts is the place.
+    # Vertices are duplicated along texture seams: compare positions.
     place = np.unique(positions, axis=0, return_inverse=True)[1].ravel()[faces].ravel()
     order = np.argsort(place, kind="stable")
     counts = np.bincount(place)
     starts = np.cumsum(counts) - counts
     total = np.zeros((len(place), 3))
     for turn in range(int(counts.max())):
-        there = order[counts[place[order]] > turn]  # each corner meets the turn-th corner at its place
+        there = order[counts[place[order]] > turn]  # pair each corner with the turn-th corner at its position
         other = order[starts[place[there]] + turn]
         close = np.einsum("ij,ij->i", unit[there // 3], unit[other // 3]) > _COSINE_OF_CREASE
         total[there[close]] += by_area[other[close] // 3]
@@ -186,7 +186,7 @@ def _interleaved(*columns: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
-    """Linear colour and opacity, 0 to 1, of 8-bit ones."""
+    """Linear colour and opacity, 0 to 1, from 8-bit values."""
     shares = colours.astype(np.float64) / 255
     if not already:
         shares[..., :3] = to_linear(shares[..., :3])
@@ -196,7 +196,7 @@ def _linear(colours: NDArray[Any], already: bool) -> NDArray[np.float64]:
 def _material(
     material: Any, linear_colours: bool
 ) -> tuple[NDArray[np.float64], NDArray[np.float16] | None, float, bool]:
-    """(colour and opacity, texture, least opacity, seen from both sides) of trimesh's materials."""
+    """(colour and opacity, texture, minimum opacity, two-sided) of a trimesh material."""
     pbr = hasattr(material, "baseColorTexture")
     image = material.baseColorTexture if pbr else getattr(material, "image", None)
     colour = np.ones(4)

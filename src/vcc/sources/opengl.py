@@ -1,8 +1,8 @@
-"""Views of triangle meshes, drawn by OpenGL without a screen: glTF, OBJ and PLY, textured and simply lit.
+"""Views of triangle meshes, rendered by OpenGL without a screen: glTF, OBJ and PLY, textured, simply lit.
 
-moderngl draws through EGL, on a graphics card or in software (Mesa's llvmpipe); trimesh reads the files. Every
-view is an off-axis projection from a pinhole in the entrance plane, so things are where the frame of the light
-field says. Radiance is linear: textures are decoded from sRGB before they are filtered.
+moderngl renders through EGL, on a graphics card or in software (Mesa's llvmpipe); trimesh reads the files.
+Every view is an off-axis projection from a pinhole in the entrance plane, so the geometry matches the frame of
+the light field. Radiance is linear: textures are decoded from sRGB before they are filtered.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from vcc.sources.meshes import Part, loaded, parts_of
 from vcc.sources.views import CameraArray, ViewCamera
 
 _NEAREST_SHARE = 1e-4
-"""The depth buffer reaches from this share of the farthest distance on."""
+"""The near clipping distance is at least this fraction of the far one."""
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """Where the array of cameras stands in a scene's own coordinates.
+    """Position and orientation of the camera array in a scene's own coordinates.
 
     Args:
-        eye: the middle of the array, in the scene's units.
+        eye: centre of the array, in the scene's units.
         target: a point on the array's axis in front of it, likewise.
-        up: a direction that is upwards in the pictures.
-        unit: metres that the scene's unit of length stands for; glTF is in metres.
+        up: direction that is upwards in the images.
+        unit: length of the scene's unit in metres; glTF uses metres.
 
     Raises:
-        InputError: eye and target coincide, up points along the axis, or a unit that is not above 0.
+        InputError: eye and target coincide, up is along the axis, or the unit is not above 0.
     """
 
     eye: Vector = (0.0, 0.0, 0.0)
@@ -55,7 +55,7 @@ class Viewpoint:
             raise InputError(f"up is {self.up}, which does not say how pictures are turned: it is along the view")
 
     def array_from_scene(self) -> NDArray[np.float64]:
-        """4×4 matrix from the scene's coordinates to the array's: metres, x right, y down, z against the view."""
+        """4×4 matrix from scene to array coordinates: metres, x right, y down, z against the viewing direction."""
         back = np.subtract(self.eye, self.target)
         back = back / np.linalg.norm(back)
         right = np.cross(self.up, back)
@@ -69,19 +69,19 @@ class Viewpoint:
 
 @dataclass(frozen=True)
 class Lighting:
-    """The light on a scene of meshes, in the axes of the camera array; there are no shadows.
+    """Lighting of a scene of meshes, in the axes of the camera array; without shadows.
 
-    Radiance = albedo · (ambient + fill·(1 − n_y)/2 + sun·max(0, n·l)): n is the surface's normal, of length 1, on
-    the side that is seen; l points to the sun; y is downwards.
+    Radiance = albedo · (ambient + fill·(1 − n_y)/2 + sun·max(0, n·l)): n is the unit surface normal on the
+    visible side; l points to the sun; y is downwards.
 
     Args:
-        ambient: light from everywhere (red, green, blue), linear.
-        sun: light from one direction, likewise: what a surface of albedo 1 that faces it shows.
+        ambient: light from all directions (red, green, blue), linear.
+        sun: light from one direction, likewise: the radiance of a surface of albedo 1 that faces the sun.
         sun_from: direction towards the sun (x right, y down, z from the scene to the cameras); any length above 0.
         fill: soft light from above, half of it from the horizon, likewise.
 
     Raises:
-        InputError: light below 0, or no direction of the sun.
+        InputError: light below 0, or a sun direction of zero length.
     """
 
     ambient: Vector = (0.15, 0.15, 0.17)
@@ -97,35 +97,35 @@ class Lighting:
 
 
 def _light(name: str, given: Sequence[float]) -> Vector:
-    """Radiance as floats, none of them below 0."""
+    """Check radiance: three finite numbers, 0 or more."""
     if len(given) != 3 or not all(part >= 0 and math.isfinite(part) for part in given):
         raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {given}")
     return float(given[0]), float(given[1]), float(given[2])
 
 
 class OpenGLRenderer:
-    """Draws the views of triangle meshes; a renderer for `vcc.sources.synthesize`.
+    """Renders the views of triangle meshes; a renderer for `vcc.sources.synthesize`.
 
-    Meshes are solid: what is less opaque than half (or than glTF's alphaCutoff) is not drawn, the rest hides what
-    is behind it. There are no shadows, mirrors or glass. A glTF material that is not double-sided is not seen from
-    behind, as glTF wants it; all others are seen from both sides. Textures repeat, with mipmaps and anisotropic
-    filtering where the driver has it. Of materials only the base colour and its texture are used. 8-bit colours of
-    OBJ and PLY are taken as sRGB, glTF's factors and vertex colours as linear; an OBJ material with a picture
-    has the picture's colour alone.
+    Meshes are solid: fragments less opaque than half (or than glTF's alphaCutoff) are discarded, all others are
+    opaque. There are no shadows, mirrors or glass. A glTF material that is not double-sided is invisible from
+    behind, as glTF specifies; all others are two-sided. Textures repeat, with mipmaps and, if the driver
+    supports it, anisotropic filtering. Materials contribute only the base colour and its texture. 8-bit colours
+    of OBJ and PLY are decoded as sRGB, glTF's factors and vertex colours are linear; an OBJ material with a
+    picture uses only the picture's colour.
 
-    Views are drawn in the thread that draws the first of them.
+    All views must be drawn in the thread that draws the first one.
 
     Args:
         meshes: files (.glb, .gltf, .obj, .ply), or trimesh scenes and meshes; one or several.
-        viewpoint: where the array stands in the scene's coordinates.
-        lighting: the light.
-        background: linear radiance (red, green, blue) where nothing is.
-        supersampling: pixels each way that are drawn for one of a view, and averaged.
-        multisampling: samples of the outline within each drawn pixel, 1 to what the driver has.
+        viewpoint: position and orientation of the array in the scene's coordinates.
+        lighting: lighting of the scene.
+        background: linear radiance (red, green, blue) of the background.
+        supersampling: pixels rendered along each axis and averaged for one pixel of a view.
+        multisampling: coverage samples per rendered pixel, 1 to the maximum of the driver.
 
     Raises:
-        InputError: a file that is not there or cannot be understood, or a picture that it names and that is not
-            there; no triangles, or none in front of the array; packages that are missing.
+        InputError: a mesh file, or a picture that it names, is missing or invalid; no triangles, or none in
+            front of the array; missing packages.
     """
 
     def __init__(
@@ -165,18 +165,18 @@ class OpenGLRenderer:
         unit: float = 1.0,
         **options: Any,
     ) -> OpenGLRenderer:
-        """A renderer whose array stands where the middle of its views has all meshes in the picture.
+        """A renderer whose array is placed so that its central view shows all meshes.
 
         Args:
             meshes: see the class.
-            cameras: the array that is to see them.
-            direction: from the middle of the meshes to the array, in the scene's coordinates; glTF's front is +z.
-            up: upwards in the pictures, likewise.
-            unit: metres that the scene's unit stands for.
-            options: of the class.
+            cameras: the array.
+            direction: from the centre of the meshes to the array, in the scene's coordinates; glTF's front is +z.
+            up: upward direction in the images, likewise.
+            unit: length of the scene's unit in metres.
+            options: further arguments of the class.
 
         Raises:
-            InputError: see the class; or views so far apart or so narrow that nothing fits.
+            InputError: as in the class; or views so far apart or so narrow that nothing fits.
         """
         _, scenes = loaded(meshes)
         low = np.min([scene.bounds[0] for scene in scenes], axis=0)
@@ -187,18 +187,18 @@ class OpenGLRenderer:
         corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3) - middle
         x, y, z = (place.array_from_scene()[:3, :3] / unit) @ corners.T
         tangents = [n * slope / 2 for n, slope in zip(cameras.pixels, cameras.slopes_per_pixel, strict=True)]
-        # A corner at depth D − z is in the picture where |x| ≤ tangent · (D − z); a little air around it.
+        # A corner at depth D − z is in the image if |x| ≤ tangent · (D − z); plus a small margin.
         distance = float(np.max([z + np.abs(x) / tangents[1], z + np.abs(y) / tangents[0]])) * 1.02
         eye = middle + away / np.linalg.norm(away) * distance
         return cls(meshes, Viewpoint(tuple(eye.tolist()), tuple(middle.tolist()), up, unit), **options)
 
     @property
     def distances(self) -> tuple[float, float]:
-        """The nearest and the farthest vertex in front of the entrance plane, metres along the axis."""
+        """Distances of the nearest and farthest vertex in front of the entrance plane, metres along the axis."""
         return self._distances
 
     def description(self) -> dict[str, Any]:
-        """All that the pictures depend on but the cameras; meshes and textures by their SHA-256."""
+        """Everything that the images depend on except the cameras; meshes and textures by their SHA-256."""
         digest = hashlib.sha256()
         for part in self._parts:
             digest.update(part.corners.tobytes())
@@ -216,16 +216,16 @@ class OpenGLRenderer:
         }
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The picture of one view.
+        """Render the image of one view.
 
         Args:
-            camera: where it is and where it looks.
+            camera: position and viewing direction of the view.
 
         Returns:
             Linear radiance, (rows, columns, 3), row 0 at the top.
 
         Raises:
-            InputError: no OpenGL on this machine, or pictures larger than it can draw.
+            InputError: no OpenGL on this machine, or an image larger than it supports.
         """
         if self._drawing is None:
             self._drawing = _Drawing(self._parts, self.lighting, self.multisampling)
@@ -241,17 +241,17 @@ class OpenGLRenderer:
         return drawn
 
     def close(self) -> None:
-        """Give the graphics memory back; drawing again takes it again."""
+        """Free the graphics memory; the next view allocates it again."""
         if self._drawing is not None:
             self._drawing.release()
             self._drawing = None
 
 
 def _projection(camera: ViewCamera, near: float, far: float) -> NDArray[np.float64]:
-    """4×4 from the array's coordinates to clip coordinates, row 0 of the picture at the bottom of OpenGL's."""
+    """4×4 matrix from array to clip coordinates, with row 0 of the image at the bottom in OpenGL."""
     across, down = camera.right - camera.left, camera.bottom - camera.top
-    # With depth Z = −z: ndc_x = 2·((x − x₀)/Z − left)/across − 1, times Z; y likewise, which OpenGL stores
-    # from −1 upwards: our top row comes first in memory without turning anything.
+    # With depth Z = −z: ndc_x = 2·((x − x₀)/Z − left)/across − 1, times Z; y likewise, which OpenGL stores from
+    # −1 upwards, so the top row comes first in memory without a flip.
     return np.array(
         [
             [2 / across, 0, 2 * camera.left / across + 1, -2 * camera.x / across],
@@ -294,7 +294,7 @@ void main() {
 
 
 class _Drawing:
-    """An OpenGL context with the parts in its memory."""
+    """An OpenGL context with the meshes in its memory."""
 
     def __init__(self, parts: Sequence[Part], lighting: Lighting, multisampling: int) -> None:
         self.context = _context()
@@ -318,7 +318,7 @@ class _Drawing:
         self.targets: list[Any] = []
 
     def _set(self, name: str, value: Any) -> None:
-        if name in self.program:  # a compiler leaves out what it finds unused
+        if name in self.program:  # the compiler removes unused uniforms
             self.program[name].value = value
 
     def _loaded(self, part: Part) -> tuple[Any, Any]:
@@ -375,8 +375,8 @@ class _Drawing:
         target.clear(*background, 1.0)
         self.program["clip_from_array"].write(projection.T.astype(np.float32).tobytes())
         self._set("eye", (camera.x, camera.y, 0.0))
-        # The array's axes are left-handed (y is down), which mirrors: triangles that run anticlockwise as seen
-        # from outside run clockwise in the window.
+        # The array's axes are left-handed (y is down), which mirrors: triangles that are anticlockwise as seen
+        # from outside are clockwise in the window.
         self.context.front_face = "cw"
         for part, array, texture in self.parts:
             self._set("textured", texture is not None)
@@ -401,7 +401,7 @@ def _context() -> Any:
     with checks.package("drawing meshes", "moderngl", "opengl"):
         import moderngl
     try:
-        create: Any = moderngl.create_context  # whose stubs leave out its options
+        create: Any = moderngl.create_context  # its type stubs lack these options
         return create(standalone=True, backend="egl", require=330)
     except Exception as error:  # the loader of libEGL raises plain exceptions
         raise InputError(

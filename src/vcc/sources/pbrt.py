@@ -1,8 +1,8 @@
-"""Pictures by PBRT version 4: a user's scene, wrapped anew for each view and given to the program ``pbrt``.
+"""Rendering by PBRT version 4: a user's scene is rewritten for each view and passed to the program ``pbrt``.
 
-The format is described at https://pbrt.org/fileformat-v4. The transformation at the ``Camera`` directive leads
-from the world to the camera, whose x points right, y up and z ahead; ``screenwindow`` is (left, right, bottom,
-top) in units of the tangent of half the field of view, which is 1 for 90°.
+Format: https://pbrt.org/fileformat-v4. The transformation at the ``Camera`` directive maps the world to the
+    camera, with x right, y up and z ahead; ``screenwindow`` is (left, right, bottom, top) in units of the
+    tangent of half the field of view, which is 1 for 90°.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _MOST_INCLUDES = 10_000
 
 
 def pbrt_program() -> Path | None:
-    """The program ``pbrt``: what the environment's PBRT names, else the one on the PATH; None if there is none."""
+    """Path of ``pbrt``: from the environment variable PBRT, else from the PATH; None if there is none."""
     named = os.environ.get("PBRT")
     found = shutil.which(named or "pbrt")
     return Path(found).absolute() if found else None
@@ -50,11 +50,11 @@ def pbrt_program() -> Path | None:
 
 @dataclass(frozen=True)
 class Directive:
-    """A directive of a scene's head, before ``WorldBegin``.
+    """A directive in the head of a scene, before ``WorldBegin``.
 
     Args:
-        name: like ``Film``.
-        words: what follows it, token by token, quotes included.
+        name: name, like ``Film``.
+        words: the following tokens, quotes included.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Directive:
 
     @property
     def kind(self) -> str:
-        """The first word without its quotes: ``perspective`` of a camera."""
+        """The first word without quotes: ``perspective`` for a camera."""
         return self.words[0].strip('"') if self.words else ""
 
     def parameters(self) -> dict[str, tuple[str, ...]]:
@@ -92,11 +92,11 @@ class Directive:
 
 @dataclass(frozen=True, eq=False)
 class PbrtScene:
-    """A scene of PBRT, its head understood, its world as it is written.
+    """A scene of PBRT with a parsed head; its world is kept as text.
 
     Args:
-        path: the file.
-        head: the directives before ``WorldBegin``, files that they include put in their place.
+        path: path of the file.
+        head: the directives before ``WorldBegin``, with included files expanded.
         world: the text from ``WorldBegin`` on.
     """
 
@@ -106,11 +106,11 @@ class PbrtScene:
 
     @classmethod
     def read(cls, path: str | PathLike[str]) -> PbrtScene:
-        """The scene in a file.
+        """Read a scene from a file.
 
         Raises:
-            InputError: no such file, no ``WorldBegin``, no ``Camera`` or more than one, an animated camera, or a
-                head that is no PBRT.
+            InputError: no such file, no ``WorldBegin``, no ``Camera`` or several, an animated camera, or a head
+                that is not PBRT.
         """
         path = expanded(path).absolute()
         with reading(path, "a scene of PBRT"):
@@ -122,14 +122,14 @@ class PbrtScene:
                     f"{path} has {cameras or 'no'} Camera before WorldBegin: one says where the views are"
                 )
             scene = cls(path, directives, world)
-            scene.camera_from_world()  # refuses what moves
+            scene.camera_from_world()  # raises for an animated camera
             return scene
 
     def camera_from_world(self) -> Matrix:
-        """4×4, the transformation at the ``Camera`` directive.
+        """The transformation at the ``Camera`` directive, 4×4.
 
         Raises:
-            InputError: an animated camera, a transformation that is not understood or scales unevenly.
+            InputError: an animated camera, or a transformation that is unsupported or scales unevenly.
         """
         current, named = np.eye(4), dict[str, Matrix]()
         for directive in self.head:
@@ -153,23 +153,23 @@ class PbrtScene:
         return current
 
     def wrapped(self, camera: ViewCamera, metres_per_unit: float = 1.0, samples: int | None = None) -> str:
-        """The text of the scene as a view's camera sees it.
+        """The text of the scene with the camera of a view.
 
-        The camera moves in its own coordinates; lights that stand in the coordinate system "camera" stay with the
-        middle of the array. Sampler, integrator, film and media stay as they are but for the film's size.
+        The camera moves in its own coordinates; lights in the coordinate system "camera" stay at the centre of
+        the array. Sampler, integrator, film and media are kept except for the film's size.
 
         Args:
-            camera: of the view.
-            metres_per_unit: how long a unit of the world is.
-            samples: paths per pixel, instead of the sampler's own number.
+            camera: camera of the view.
+            metres_per_unit: length of the world's unit, metres.
+            samples: paths per pixel, replacing the sampler's own number.
 
         Raises:
-            InputError: samples for a stratified sampler, which counts them across and down.
+            InputError: samples for a stratified sampler, which has separate numbers across and down.
         """
         middle = self.camera_from_world()
         unit = _scale_of(middle, self.path) / metres_per_unit
         move = np.eye(4)
-        move[:2, 3] = -camera.x * unit, camera.y * unit  # PBRT's y points up, and the world moves the other way
+        move[:2, 3] = -camera.x * unit, camera.y * unit  # PBRT's y points up; the world moves against the camera
         lines = []
         seen = set()
         for directive in self.head:
@@ -197,7 +197,7 @@ class PbrtScene:
         return "\n".join([*lines, self.world])
 
     def files(self) -> dict[str, str]:
-        """The SHA-256 of the scene's file and of all files that it and those that it includes name."""
+        """The SHA-256 of the scene's file and of all files named by it or by its includes."""
         found: dict[str, str] = {}
         waiting = [self.path]
         while waiting:
@@ -213,22 +213,22 @@ class PbrtScene:
 
 
 class PbrtRenderer:
-    """A scene of PBRT version 4, rendered view by view by the program ``pbrt``.
+    """Renders a scene of PBRT version 4 view by view with the program ``pbrt``.
 
-    The scene's own camera says where the middle of the array stands and where it looks. The camera becomes a
-    perspective one without a lens, the film gets the size of the views, the pixel filter a box; all else is passed
-    on.
-    For each view a file is written beside the scene, whose relative paths hold there, and taken away again.
+    The scene's own camera defines the centre and direction of the array. The camera is replaced by a
+    perspective camera without a lens, the film gets the size of the views, and the pixel filter is a box;
+    everything else is kept. For each view, a temporary file is written next to the scene, so that relative
+    paths stay valid.
 
     Args:
         scene: the ``.pbrt`` file.
-        samples: paths per pixel; None leaves it to the scene's sampler.
-        seed: of the random numbers; each view has one of its own.
-        metres_per_unit: how long a unit of the scene is, metres.
-        program: ``pbrt``; None takes what `pbrt_program` finds.
+        samples: paths per pixel; None keeps the number of the scene's sampler.
+        seed: seed of the random numbers; each view derives its own.
+        metres_per_unit: length of the scene's unit, metres.
+        program: path of ``pbrt``; None uses `pbrt_program`.
 
     Raises:
-        InputError: there is no such program or scene, or what `PbrtScene.read` refuses.
+        InputError: no such program or scene, or as in `PbrtScene.read`.
     """
 
     def __init__(
@@ -255,7 +255,7 @@ class PbrtRenderer:
         self._metres_per_unit = checks.above_zero("metres_per_unit", metres_per_unit)
 
     def description(self) -> dict[str, Any]:
-        """All that a picture depends on except the camera; files and the program by their SHA-256."""
+        """Everything that an image depends on except the camera; files and the program by their SHA-256."""
         return {
             "name": "pbrt",
             "program_sha256": hashlib.sha256(self._program.read_bytes()).hexdigest(),
@@ -267,11 +267,11 @@ class PbrtRenderer:
         }
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The picture that a camera takes: linear radiance, shape (rows, columns, 3).
+        """Render the image of a camera: linear radiance, shape (rows, columns, 3).
 
         Raises:
-            InputError: no file can be written beside the scene, ``pbrt`` fails (its message is shown), or the
-                picture that it writes is no RGB one.
+            InputError: the scene's folder is not writable, ``pbrt`` fails (its message is included), or its
+                output is not RGB.
         """
         seed = (self._seed * 1_000_003 + camera.row * 65_537 + camera.column) % 2**31
         path = self._scene.path
@@ -304,10 +304,10 @@ class PbrtRenderer:
 
 
 def _read_exr(path: Path) -> NDArray[np.float32]:
-    """The R, G and B of an OpenEXR file, shape (rows, columns, 3).
+    """R, G and B of an OpenEXR file, shape (rows, columns, 3).
 
     Raises:
-        InputError: it has none.
+        InputError: a channel is missing.
     """
     channels = read_exr_channels(path)
     if not {"R", "G", "B"} <= set(channels):
@@ -321,7 +321,7 @@ def _text(path: Path) -> str:
 
 
 def _split(text: str, path: Path) -> tuple[str, str]:
-    """The head of a scene, and all from ``WorldBegin`` on."""
+    """Split a scene into its head and the text from ``WorldBegin`` on."""
     for match in _TOKEN.finditer(text):
         if match[0] == "WorldBegin":
             return text[: match.start()], text[match.start() :]
@@ -329,7 +329,7 @@ def _split(text: str, path: Path) -> tuple[str, str]:
 
 
 def _directives(text: str, path: Path, folder: Path, depth: int, included: list[Path]) -> Iterator[Directive]:
-    """The directives of a text, included files in their place; those files are added to ``included``."""
+    """The directives of a text with included files expanded; the included files are added to ``included``."""
     if depth > _DEEPEST_INCLUDE or len(included) > _MOST_INCLUDES:
         raise InputError(f"{path} includes itself, or is included {len(included)} times and more")
     words: list[str] = []
@@ -356,10 +356,10 @@ def _directives(text: str, path: Path, folder: Path, depth: int, included: list[
 
 
 def _matrix(directive: Directive, path: Path) -> Matrix:
-    """The matrix of a transforming directive.
+    """The matrix of a directive that transforms.
 
     Raises:
-        InputError: another count of numbers, or what is no number.
+        InputError: a wrong number of values, or values that are not numbers.
     """
     try:
         numbers = np.array([float(word) for word in directive.words if word not in "[]"])
@@ -369,7 +369,7 @@ def _matrix(directive: Directive, path: Path) -> Matrix:
         raise InputError(f"{path}: {directive} needs {_NUMBERS[directive.name]} numbers, not {len(numbers)}")
     matrix = np.eye(4)
     if directive.name in ("Transform", "ConcatTransform"):
-        return numbers.reshape(4, 4).T  # written column by column
+        return numbers.reshape(4, 4).T  # stored column by column
     if directive.name == "Translate":
         matrix[:3, 3] = numbers
     elif directive.name == "Scale":
@@ -389,21 +389,21 @@ def _matrix(directive: Directive, path: Path) -> Matrix:
 
 
 def _rotation(angle: float, axis: Matrix) -> Matrix:
-    """Rodrigues' formula: anticlockwise about an axis that points at the reader, in right-handed coordinates."""
+    """Rodrigues' formula: anticlockwise about an axis that points at the viewer, in right-handed coordinates."""
     x, y, z = axis / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
 
 
 def _scale_of(matrix: Matrix, path: Path) -> float:
-    """By how much a transformation scales lengths.
+    """The factor by which a transformation scales lengths.
 
     Raises:
-        InputError: not by the same in all directions.
+        InputError: the factor depends on the direction.
     """
     square = matrix[:3, :3].T @ matrix[:3, :3]
     scale = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
-    # Numbers in files have six digits or so.
+    # Numbers in files have about six digits.
     if not (scale > 0 and np.allclose(square, scale**2 * np.eye(3), atol=1e-4 * scale**2)):
         raise InputError(f"{path}: the transformation of its camera scales unevenly or shears; take that out")
     return scale
@@ -425,7 +425,7 @@ def _camera(own: Directive, camera: ViewCamera) -> Directive:
 
 def _film(own: Directive, pixels: tuple[int, int]) -> Directive:
     size = {"integer xresolution": [str(pixels[1])], "integer yresolution": [str(pixels[0])]}
-    # Half precision, its default, would be rounded a second time.
+    # The default, half precision, would be rounded a second time.
     return _changed(own, (*_GONE_FROM_FILM, "savefp16"), {**size, "bool savefp16": ["false"]})
 
 

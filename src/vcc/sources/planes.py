@@ -1,8 +1,8 @@
-"""A scene of textured planes, facing the camera or tilted, the nearer ones partly covering the others.
+"""A scene of textured planes, facing the camera or tilted, nearer ones partly occluding farther ones.
 
-Its light field is known in closed form at every ray (`PlanesScene.radiance_along`), which makes it the ground
-truth of tests and of the demo; `PlanesScene.light_field` samples it as an array of cameras would, fast where all
-planes face the camera, and `PlanesScene.render` makes single views of any planes.
+The radiance of every ray has a closed form (`PlanesScene.radiance_along`), so the scene is the ground truth of
+tests and of the demo. `PlanesScene.light_field` samples the light field of a camera array, fast if all planes
+face the camera; `PlanesScene.render` makes single views of any planes.
 """
 
 from __future__ import annotations
@@ -30,33 +30,33 @@ from vcc.sources.textures import Array, Texture, mean_radiance_and_opacity, radi
 from vcc.sources.views import CameraArray, ViewCamera
 
 RASTER_PER_PIXEL = 4
-"""Points of a texture across a pixel of a view: a sample is the mean of so many squared."""
+"""Texture points across a pixel of a view: a sample is the mean over this number squared."""
 _ROWS_PER_BLOCK = 256
 _POINTS_PER_BLOCK = 2**18
-"""Points of a view looked at together: what is known of them fits the cache of a processor."""
+"""Points of a view that are processed together, so that their data fit the processor cache."""
 
 _ALONG = 1e-12
-"""A ray that leaves a plane by less than this along a unit of its way runs along it: rounding of angles."""
+"""A ray that leaves a plane by less than this per unit length counts as parallel (rounding of angles)."""
 
 
 @dataclass(frozen=True, eq=False)
 class TexturedPlane:
-    """A flat thing: a texture at a distance, facing the camera or turned.
+    """A plane with a texture at a distance, facing the camera or rotated.
 
-    Turned first by ``pitch`` about its horizontal middle line, then by ``yaw`` about the upright one through its
-    middle, its texture's axes point along e₁ = (cos yaw, 0, −sin yaw) and
-    e₂ = (sin pitch · sin yaw, cos pitch, sin pitch · cos yaw) in space (x right, y down, z towards the cameras).
+    Rotated first by ``pitch`` about its horizontal centre line, then by ``yaw`` about the vertical axis through
+    its centre, so the texture's axes are e₁ = (cos yaw, 0, −sin yaw) and e₂ = (sin pitch · sin yaw, cos pitch,
+    sin pitch · cos yaw) in space (x right, y down, z towards the cameras).
 
     Args:
-        texture: radiance, and opacity if it has any, as a function of (x, y) in metres from the plane's
-            middle (x right, y down, on the plane); see `vcc.sources.textures`.
-        distance: of its middle from the entrance plane, metres: it stands at z = −distance.
-        width: metres; nothing is there outside. Infinite by default.
-        height: metres; as ``width`` if None.
-        middle: place (x, y) of its middle off the axis, metres.
-        opacity: 0 to 1, times that of the texture.
-        yaw: angle, radians; positive takes the right side away from the camera.
-        pitch: angle, radians; positive takes the upper side away from the camera, as of a table.
+        texture: radiance, optionally with opacity, as a function of (x, y) in metres from the plane's centre (x
+            right, y down, on the plane); see `vcc.sources.textures`.
+        distance: distance of the centre from the entrance plane, metres; the centre is at z = −distance.
+        width: width, metres; transparent outside. Infinite by default.
+        height: height, metres; equal to ``width`` if None.
+        middle: position (x, y) of the centre relative to the axis, metres.
+        opacity: 0 to 1, multiplied by the opacity of the texture.
+        yaw: angle, radians; positive moves the right side away from the camera.
+        pitch: angle, radians; positive moves the upper side away from the camera, like a table.
 
     Raises:
         InputError: a distance or size of zero or less, an opacity outside 0 to 1, or an angle that is not finite.
@@ -82,36 +82,36 @@ class TexturedPlane:
 
     @property
     def tilted(self) -> bool:
-        """Whether it does not face the camera."""
+        """Whether the plane does not face the camera."""
         return self.yaw != 0 or self.pitch != 0
 
     def at(self, x: Array, y: Array, cell: float = 0.0) -> Array:
-        """Radiance times opacity, and opacity, shape (..., 4), at positions of the scene, if it faces the camera.
+        """Radiance times opacity, and opacity, shape (..., 4), at positions in the scene; only if not tilted.
 
         Args:
             x: metres from the axis, to the right.
             y: metres from the axis, downwards; broadcast against x.
-            cell: size of the square that each position stands for, metres: one cut by the border of the plane
-                counts by its share, and textures that can are averaged over it. 0 for points.
+            cell: side of the square around each position, metres; squares at the border of the plane are
+                weighted by their overlap, and textures with ``mean`` are averaged over them. 0 for points.
         """
         return self._on_sheet(np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1], cell)
 
     def along(
         self, u: Array, v: Array, s: Array, t: Array, pixel: tuple[float, float] = (0.0, 0.0)
     ) -> tuple[Array, Array]:
-        """What rays meet on this plane.
+        """Intersect rays with this plane.
 
         Args:
-            u: where the rays meet the entrance plane, metres to the right.
+            u: intersection of the rays with the entrance plane, metres to the right.
             v: likewise downwards; all four broadcast against each other.
             s: slopes du/dz.
             t: slopes dv/dz.
-            pixel: range of slopes (of s, of t) that each ray stands for; 0 for points.
+            pixel: slope extents (of s, of t) of the pixel around each ray; 0 for points.
 
         Returns:
-            The distance at which each ray meets the plane, metres along the axis, infinite where it does not
-            (behind the entrance plane, or along the plane), shape (...) or one number for all; and what it shows
-            there, shape (..., 4): radiance times opacity, and opacity.
+            The distance of the intersection of each ray, metres along the axis, infinite if there is none
+            (behind the entrance plane, or parallel to the plane), shape (...) or a single number; and the
+            texture there, shape (..., 4): radiance times opacity, and opacity.
         """
         if not self.tilted:
             x, y = u - self.distance * s, v - self.distance * t
@@ -129,7 +129,7 @@ class TexturedPlane:
         place = [sum(axis[n] * offset[n] for n in range(3)) for axis in (across, down)]
         cells: list[Array | float] = [0.0, 0.0]
         if max(pixel) > 0:
-            # How far the place moves over the slopes of a pixel: d(u + z·s)/ds = z + s·dz/ds and so on.
+            # Displacement of the intersection over a pixel's slopes: d(u + z·s)/ds = z + s·dz/ds and so on.
             steepness = np.where(facing == 0, 1.0, facing)
             by_slope = (-z * normal[0] / steepness, -z * normal[1] / steepness)
             for n, axis in enumerate((across, down)):
@@ -151,7 +151,7 @@ class TexturedPlane:
         return across, down
 
     def _on_sheet(self, x: Array, y: Array, wide: Array | float, high: Array | float | None = None) -> Array:
-        """What it shows at positions from its middle that stand for rectangles of some size; 0 for points."""
+        """The texture at positions relative to the centre, averaged over rectangles; size 0 for points."""
         high = wide if high is None else high
         if np.ndim(wide) == 0 and wide == 0:
             values = radiance_and_opacity(self.texture, x, y)
@@ -164,7 +164,7 @@ class TexturedPlane:
         return np.asarray(values * share.astype(values.dtype)[..., None])
 
     def description(self) -> dict[str, Any]:
-        """All that it shows, as JSON can hold it; see `PlanesScene.description`."""
+        """Everything that the plane's appearance depends on, as JSON data; see `PlanesScene.description`."""
         known = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "texture"}
         return {
             **{name: _in_json(value) for name, value in known.items()},
@@ -173,7 +173,7 @@ class TexturedPlane:
 
 
 def _in_json(value: Any) -> Any:
-    """A parameter as JSON can hold it: arrays by their hash, infinity as a word."""
+    """A parameter as JSON data: arrays by their hash, infinity as text."""
     if isinstance(value, np.ndarray):
         return {"shape": list(value.shape), "sha256": hashlib.sha256(np.ascontiguousarray(value).data).hexdigest()}
     if isinstance(value, tuple | list):
@@ -184,7 +184,7 @@ def _in_json(value: Any) -> Any:
 
 
 def _texture_in_json(texture: Texture) -> dict[str, Any]:
-    """A texture's name and parameters; of a function, what it returns at places that do not change."""
+    """A texture's name and parameters; for a function, a hash of its values at fixed positions."""
     kind = texture if hasattr(texture, "__qualname__") else type(texture)
     name = f"{kind.__module__}.{kind.__qualname__}"
     described: Any = texture
@@ -194,27 +194,27 @@ def _texture_in_json(texture: Texture) -> dict[str, Any]:
         if all(isinstance(value, simple) for value in known.values()):
             return {"kind": name, **known}
     random = np.random.default_rng(0)
-    # in all sizes of things, as nobody knows how large this one is
+    # positions on all scales, since the size of the plane is unknown
     x, y = random.standard_normal((2, 4096)) * 10.0 ** random.uniform(-3, 1, 4096)
     seen = radiance_and_opacity(texture, x, y).astype(np.float32)
     return {"kind": name, "seen_sha256": hashlib.sha256(np.ascontiguousarray(seen).data).hexdigest()}
 
 
 def _share_inside(place: Array, size: float, cell: Array | float) -> Array:
-    """The share of cells around places that lies within ±size/2, along one axis."""
+    """The overlap of cells around positions with ±size/2, along one axis, as a fraction of the cell."""
     if math.isinf(size) or (np.ndim(cell) == 0 and cell == 0):
         return (np.abs(place) <= size / 2).astype(np.float64)
     return overlap_share(place, cell, size)
 
 
 class PlanesScene:
-    """Textured planes before a black background.
+    """Textured planes in front of a black background.
 
     Args:
-        planes: in any order; kept nearest first.
+        planes: the planes in any order; sorted with the nearest first.
 
     Raises:
-        InputError: no plane at all.
+        InputError: no planes.
     """
 
     def __init__(self, planes: Iterable[TexturedPlane]) -> None:
@@ -228,14 +228,14 @@ class PlanesScene:
 
     @property
     def distances(self) -> tuple[float, ...]:
-        """The distances of the planes from the entrance plane, nearest first, metres."""
+        """Distances of the planes from the entrance plane, nearest first, metres."""
         return tuple(plane.distance for plane in self.planes)
 
     def radiance_along(self, u: ArrayLike, v: ArrayLike, s: ArrayLike, t: ArrayLike) -> NDArray[np.float64]:
-        """The radiance of rays, in closed form: nearer planes over farther ones by their opacity.
+        """The radiance of rays in closed form: nearer planes composited over farther ones.
 
         Args:
-            u: where the rays meet the entrance plane, metres to the right.
+            u: intersection of the rays with the entrance plane, metres to the right.
             v: likewise downwards; all four broadcast against each other.
             s: slopes du/dz.
             t: slopes dv/dz.
@@ -249,7 +249,7 @@ class PlanesScene:
     def _along(self, u: Array, v: Array, s: Array, t: Array, pixel: tuple[float, float]) -> NDArray[np.float64]:
         shape = np.broadcast_shapes(u.shape, v.shape, s.shape, t.shape)
         met = [plane.along(u, v, s, t, pixel) for plane in self.planes]
-        if any(plane.tilted for plane in self.planes):  # which is nearer is then for each ray to say
+        if any(plane.tilted for plane in self.planes):  # tilted planes: the order of planes depends on the ray
             order = np.argsort(np.stack([np.broadcast_to(far, shape) for far, _ in met]), axis=0, kind="stable")
             shown = np.stack([np.broadcast_to(values, (*shape, 4)) for _, values in met])
             layers = iter(np.take_along_axis(shown, order[..., None], axis=0))
@@ -262,13 +262,13 @@ class PlanesScene:
         return total
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """One view; this makes a scene a renderer for `vcc.sources.synthesize`.
+        """Render one view; with this method a scene is a renderer for `vcc.sources.synthesize`.
 
-        Where all planes face the camera and pixels are square, textures are evaluated once and kept for further
-        views, as `light_field` has them. Else each sample is the mean over 4×4 points of its pixel.
+        If all planes face the camera and pixels are square, textures are evaluated once and reused for further
+        views, as in `light_field`. Else each sample is the mean over 4×4 points of its pixel.
 
         Args:
-            camera: where it is and where it looks.
+            camera: position and viewing direction of the view.
 
         Returns:
             Linear radiance, (rows, columns, 3), row 0 at the top.
@@ -279,7 +279,7 @@ class PlanesScene:
             return self._from_rasters(camera, across)
         fine = RASTER_PER_PIXEL
         step = ((camera.right - camera.left) / columns / fine, (camera.bottom - camera.top) / rows / fine)
-        # A ray from the direction a has the slope −a.
+        # A ray from direction a has slope −a.
         s = -(camera.left + (np.arange(columns * fine) + 0.5) * step[0])[None, :]
         picture = np.empty((rows, columns, 3), np.float32)
         block = max(1, _POINTS_PER_BLOCK // (columns * fine**2))
@@ -291,13 +291,14 @@ class PlanesScene:
         return picture
 
     def _from_rasters(self, camera: ViewCamera, slope: float) -> NDArray[np.float32]:
-        # By how many pixels each plane is displaced in this view, negated: rows, columns
+        # Displacement of each plane in this view in pixels, negated: rows, columns
         middle = ((camera.top + camera.bottom) / 2, (camera.left + camera.right) / 2)
         place = (camera.y, camera.x)
         shifts = np.array([[(place[n] / z + middle[n]) / slope for n in (0, 1)] for z in self.distances])
         margins = (math.ceil(np.abs(shifts[:, 0]).max()) + 1, math.ceil(np.abs(shifts[:, 1]).max()) + 1)
         kept = self._kept
-        # As far to both sides: an array begins in a corner, and what is kept for it holds for all others.
+        # Equal margins on both sides: the first view of an array is a corner, and its rasters then serve all
+        # other views.
         if kept is None or not kept[0].holds(camera.pixels, slope, margins):
             grid = _GridAround((1, 1), camera.pixels, 1.0, slope, math.inf, margins)
             with Workers(cores()) as pool:
@@ -310,10 +311,11 @@ class PlanesScene:
         return np.asarray(picture[0])
 
     def description(self) -> dict[str, Any]:
-        """All that the pictures depend on but the cameras, as JSON can hold it.
+        """Everything that the images depend on except the cameras, as JSON data.
 
-        Textures that are dataclasses of numbers, words and arrays are described by these; any other function by
-        what it returns at 4096 places, so that a change that none of them sees stays unnoticed.
+        Textures that are dataclasses of numbers, texts and arrays are described by their fields. Other
+        functions are described by their values at 4096 positions, so a change that affects none of them is not
+        noticed.
         """
         return {"renderer": "planes", "planes": [plane.description() for plane in self.planes]}
 
@@ -329,26 +331,26 @@ class PlanesScene:
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> LightField:
-        """What a planar array of parallel pinhole cameras sees of the scene.
+        """The light field of a planar array of parallel pinhole cameras.
 
-        A sample is the mean over its pixel: each texture is evaluated at 4×4 points for each pixel at its
-        distance and averaged over the pixel, once; a view looks this raster up between its points linearly, and
-        planes are composited pixel by pixel. With a tilted plane, each view is made by `render`, which is slower.
-        Integer samples are rounded to the nearest, without dithering, and radiance above 1 is cut off.
+        A sample is the mean over its pixel. Each texture is evaluated once, at 4×4 points per pixel at its
+        distance, and averaged over the pixel; a view interpolates this raster linearly, and planes are
+        composited per pixel. With a tilted plane, each view is computed by `render`, which is slower. Integer
+        samples are rounded without dithering, and radiance above 1 is clipped.
 
         Args:
             views: rows and columns of views.
             pixels: rows and columns of pixels of a view.
             spacing: distance between neighbouring views, metres.
             slope_per_pixel: pixel pitch over focal length of the views.
-            focus_distance: where the views converge, metres.
+            focus_distance: distance at which the views converge, metres.
             dtype: ``"uint8"``, ``"uint16"`` or ``"float32"``.
-            threads: how many work at once; None takes as many as this process may use cores.
+            threads: number of threads; None uses all cores available to this process.
             progress: called with (done, total) in rows of views.
 
         Returns:
-            Shape (views, views, rows, columns, 3), with the range of disparities du·(1/Z − 1/F)/ps known (left to
-            be measured where a plane is tilted).
+            Shape (views, views, rows, columns, 3), with the disparity range du·(1/Z − 1/F)/ps set (measured
+            later if a plane is tilted).
 
         Raises:
             InputError: a size, spacing or slope of zero or less, or another dtype.
@@ -358,7 +360,7 @@ class PlanesScene:
             raise InputError(f"a light field is made as uint8, uint16 or float32, not {kind}")
         if min(*views, *pixels) < 1:
             raise InputError(f"a light field needs at least one view and pixel, not {views} and {pixels}")
-        # A stand-in lets LightField check the geometry before any work is done.
+        # A single sample lets LightField check the geometry before any work is done.
         values = np.empty((*views, *pixels, 3), dtype=kind)
         LightField.from_views(np.zeros((1, 1, 1, 1, 3), kind), spacing, slope_per_pixel, focus_distance)
         if any(plane.tilted for plane in self.planes):
@@ -386,9 +388,9 @@ class _Grid:
     focus_distance: float
 
     def shifts(self, distance: float, axis: int) -> Array:
-        """By how many pixels the views along an axis (0: rows) are displaced from the middle one, negated."""
+        """Displacements of the views along an axis (0: rows) in pixels, relative to the central view, negated."""
         place = (np.arange(self.views[axis]) - (self.views[axis] - 1) / 2) * self.spacing
-        # A pixel sees x = u − Z·s = u·(1 − Z/F) + Z·ps·(k − k₀), Z·ps metres a pixel.
+        # A pixel sees x = u − Z·s = u·(1 − Z/F) + Z·ps·(k − k₀), which is Z·ps metres per pixel.
         return np.asarray(place * (1 / distance - 1 / self.focus_distance) / self.slope_per_pixel)
 
     def pixel(self, distance: float) -> float:
@@ -396,13 +398,13 @@ class _Grid:
         return distance * self.slope_per_pixel
 
     def margin(self, distances: tuple[float, ...], axis: int) -> int:
-        """Whole pixels by which a raster reaches beyond the middle view, for all planes."""
+        """Pixels by which a raster extends beyond the central view, for all planes."""
         return math.ceil(max(float(np.abs(self.shifts(z, axis)).max()) for z in distances)) + 1
 
 
 @dataclass(frozen=True)
 class _GridAround(_Grid):
-    """The geometry of views somewhere: as many pixels, and margins that hold them all."""
+    """The geometry of views anywhere, with a fixed number of pixels and fixed margins."""
 
     margins: tuple[int, int] = (0, 0)
 
@@ -410,13 +412,13 @@ class _GridAround(_Grid):
         return self.margins[axis]
 
     def holds(self, pixels: tuple[int, int], slope: float, margins: tuple[int, int]) -> bool:
-        """Whether views of these are among them."""
+        """Whether views with these parameters fit into the rasters of this grid."""
         same = self.pixels == tuple(pixels) and math.isclose(self.slope_per_pixel, slope, rel_tol=1e-12)
         return same and all(mine >= other for mine, other in zip(self.margins, margins, strict=True))
 
 
 def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: Workers) -> NDArray[np.float32]:
-    """Each plane's texture averaged over a pixel, at 4 points a pixel: (planes, rows, 4 phases, 4, columns)."""
+    """Each plane's texture averaged over a pixel, at 4 points per pixel: (planes, rows, 4 phases, 4, columns)."""
     fine = RASTER_PER_PIXEL
     distances = tuple(plane.distance for plane in planes)
     rows, columns = (grid.pixels[axis] + 2 * grid.margin(distances, axis) for axis in (0, 1))
@@ -426,7 +428,7 @@ def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: Workers) -> N
         plane = planes[number]
         stop = min(start + _ROWS_PER_BLOCK, rows * fine)
         step = grid.pixel(plane.distance) / fine
-        # Point m of the raster is the mean over points m … m + fine − 1, whose middle is m + (fine − 1)/2.
+        # Point m of the raster is the mean over points m … m + fine − 1, with centre m + (fine − 1)/2.
         x = (np.arange(columns * fine + fine - 1) - (columns * fine - 1) / 2 - (fine - 1) / 2) * step
         y = (np.arange(start, stop + fine - 1) - (rows * fine - 1) / 2 - (fine - 1) / 2) * step
         values = plane.at(x[None, :], y[:, None], step).astype(np.float32, copy=False)
@@ -495,13 +497,13 @@ def _fill_view_by_view(
 
 
 def _starts(planes: tuple[TexturedPlane, ...], grid: _Grid, axis: int) -> tuple[Array, NDArray[np.float32]]:
-    """Where pixel 0 of each view lies in each raster: point (planes, views) and share of the next point."""
+    """Position of pixel 0 of each view in each raster: point (planes, views) and weight of the next point."""
     distances = tuple(plane.distance for plane in planes)
     return _starts_at(np.stack([grid.shifts(z, axis) for z in distances]), grid.margin(distances, axis))
 
 
 def _starts_at(shifts: Array, margin: int) -> tuple[Array, NDArray[np.float32]]:
-    # The middle of pixel 0 lies (fine − 1)/2 points behind the first point of its pixel.
+    # The centre of pixel 0 is (fine − 1)/2 points after the first point of its pixel.
     place = (margin + shifts) * RASTER_PER_PIXEL + (RASTER_PER_PIXEL - 1) / 2
     first = np.floor(place).astype(np.int64)
     return first, (place - first).astype(np.float32)

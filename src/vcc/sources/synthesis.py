@@ -1,4 +1,4 @@
-"""Light fields from renderers: every view asked for in turn, written as it is done, gone on with after a stop."""
+"""Light fields from renderers: rendered view by view, stored as they are done, continued after a stop."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from vcc.sources.views import CameraArray, ViewCamera
 from vcc.store import StoredLightField, create_store
 
 DTYPES = ("float16", "float32", "uint8", "uint16")
-"""What the samples of a synthesized light field may be kept as."""
+"""Supported types of the samples of a synthesized light field."""
 
 
 class Renderer(Protocol):
-    """What makes the picture of one view. A renderer that holds something open may also have ``close()``."""
+    """Renders the image of one view. A renderer that holds resources may also have ``close()``."""
 
     def description(self) -> dict[str, Any]:
-        """All that a picture depends on except the camera, as JSON can hold it.
+        """Everything that an image depends on except the camera, as JSON data.
 
-        Pictures are kept together in a store only if their descriptions are equal.
+        Images are stored together only if their descriptions are equal.
         """
         ...
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The picture that a camera takes: linear radiance, shape (rows, columns, 3), row 0 at the top.
+        """Return the image of a camera: linear radiance, shape (rows, columns, 3), row 0 at the top.
 
         Each sample is the mean over its pixel.
         """
@@ -48,27 +48,27 @@ def synthesize(
     dtype: DTypeLike = "float16",
     progress: Progress | None = None,
 ) -> LightField | StoredLightField:
-    """The light field that an array of cameras takes of a renderer's scene, view by view.
+    """Render the light field of a scene with an array of cameras, view by view.
 
-    With a store, each view is on the disk as soon as it is rendered: after a stop, the same call goes on with the
-    views that are missing. A store made from another description (scene, samples, cameras, dtype …) is refused.
+    With a store, each view is written to disk as soon as it is rendered; after a stop, the same call continues
+    with the missing views. A store with another description (scene, samples, cameras, dtype …) raises.
 
     Args:
-        renderer: what makes the pictures.
-        cameras: where the views are.
+        renderer: renderer of the images.
+        cameras: positions of the views.
         store: folder of a Zarr store (see `vcc.store`); None keeps the light field in memory.
-        dtype: ``"float16"`` (11 bits of precision, radiance up to 65504) or ``"float32"`` keep radiance as it is.
-            ``"uint8"`` and ``"uint16"`` are rounded, full scale is radiance 1, and what is brighter is cut off,
-            which a warning says.
-        progress: called with (done, total) in views, those found in the store included.
+        dtype: ``"float16"`` (11 bits of precision, radiance up to 65504) or ``"float32"`` keep radiance linear.
+            ``"uint8"`` and ``"uint16"`` are rounded with full scale at radiance 1; brighter samples are
+            clipped, with a warning.
+        progress: called with (done, total) in views, including views found in the store.
 
     Returns:
-        A `vcc.LightField`, or with a store what `vcc.store.open_store` gives: shape (v, u, t, s, 3), linear.
+        A `vcc.LightField`, or with a store the result of `vcc.store.open_store`: shape (v, u, t, s, 3), linear.
 
     Raises:
-        InputError: another dtype; a store of another description; a view that could not be rendered, is of another
-            shape than asked for, or holds values that are not finite, negative or too large for the dtype. The
-            views before it stay in the store.
+        InputError: another dtype; a store of another description; a view that could not be rendered, has
+            another shape than requested, or contains values that are not finite, negative or too large for the
+            dtype. Views before it stay in the store.
     """
     kind = np.dtype(dtype)
     if kind.name not in DTYPES:
@@ -129,10 +129,10 @@ def _rendered(
     cut: _Cut,
     hint: str,
 ) -> NDArray[Any]:
-    """A view as it is kept.
+    """Render a view and convert it to the stored type.
 
     Raises:
-        InputError: it could not be rendered or kept; the message says which view, why, and how to go on.
+        InputError: rendering or conversion failed; the message names the view, the reason and how to continue.
     """
     total = cameras.views[0] * cameras.views[1]
     view = f"view ({row}, {column}), number {done + 1} of {total}"
@@ -148,7 +148,7 @@ def _rendered(
 
 
 class _Cut:
-    """Radiance to samples of a dtype, counting what is cut off."""
+    """Converts radiance to samples of a dtype and counts clipped samples."""
 
     def __init__(self, kind: np.dtype[Any]) -> None:
         self._kind = kind
@@ -156,10 +156,10 @@ class _Cut:
         self._seen = 0
 
     def kept(self, radiance: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
-        """The samples of a picture.
+        """Check the image and convert it to the stored type.
 
         Raises:
-            InputError: they are not radiance, or do not fit the dtype.
+            InputError: the values are not valid radiance, or do not fit the dtype.
         """
         if radiance.shape != shape:
             raise InputError(f"came as an array of shape {radiance.shape}, and {shape} was asked for")
@@ -186,7 +186,7 @@ class _Cut:
         return np.asarray(np.rint(np.minimum(radiance, 1.0) * full), dtype=self._kind)
 
     def warn(self) -> None:
-        """Say how much was cut off, if anything was."""
+        """Warn about clipped samples, if there are any."""
         if self._cut:
             warnings.warn(
                 ResultWarning(

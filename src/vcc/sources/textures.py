@@ -1,10 +1,10 @@
-"""What a plane of a scene looks like: radiance and opacity as functions of position.
+"""Textures of planes in a scene: radiance and opacity as functions of position.
 
-A texture is any function of positions (x, y) in metres (x right, y down, from the plane's middle; arrays that
-broadcast against each other) that returns radiance, shape (...) for grey or (..., 3), or (..., 4) with opacity
-last and the radiance already multiplied by it. A texture with detail finer than pixels may have a method
-``mean(x, y, cell)`` besides, its mean over squares of side ``cell`` (metres, broadcast against x and y), as
-`Picture` has. This package ships no pictures: its own textures are procedural.
+A texture is any function of positions (x, y) in metres (x right, y down, from the centre of the plane; arrays
+that broadcast against each other) that returns radiance, shape (...) for grey or (..., 3), or (..., 4) with
+opacity last and radiance multiplied by opacity. A texture with detail finer than pixels may also have a method
+``mean(x, y, cell)`` that returns its mean over squares of side ``cell`` (metres, broadcast against x and y),
+like `Picture`. The textures of this package are procedural.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ Colour = Sequence[float] | Array
 
 
 def radiance_and_opacity(texture: Texture, x: Array, y: Array) -> Array:
-    """What a texture returns, as (..., 4): red, green and blue times opacity, and opacity.
+    """Evaluate a texture as (..., 4): red, green and blue times opacity, and opacity.
 
     Args:
-        texture: see the head of this module.
+        texture: see the docstring of this module.
         x: positions, metres.
         y: positions, metres, which broadcast against x.
 
@@ -48,10 +48,10 @@ def radiance_and_opacity(texture: Texture, x: Array, y: Array) -> Array:
 
 
 def mean_radiance_and_opacity(texture: Texture, x: Array, y: Array, cell: Array | float) -> Array:
-    """What a texture returns for squares around positions, as (..., 4): by its ``mean``, or at their middles.
+    """Average a texture over squares around positions, as (..., 4): by ``mean`` if defined, else at the centres.
 
     Args:
-        texture: see the head of this module.
+        texture: see the docstring of this module.
         x: positions, metres.
         y: positions, metres, which broadcast against x.
         cell: side of the squares, metres.
@@ -68,7 +68,7 @@ def mean_radiance_and_opacity(texture: Texture, x: Array, y: Array, cell: Array 
 def _with_opacity(texture: Texture, values: Array, shape: tuple[int, ...]) -> Array:
     if values.shape == (*shape, 4):
         return values
-    if values.ndim <= len(shape):  # grey, or one number for all
+    if values.ndim <= len(shape):  # grey, or one number for all positions
         values = np.broadcast_to(values, shape)[..., None]
     if values.ndim != len(shape) + 1 or values.shape[-1] not in (1, 3):
         name = getattr(texture, "__name__", type(texture).__name__)
@@ -99,16 +99,16 @@ class Uniform:
 
 @dataclass(frozen=True)
 class Waves:
-    """A smooth texture: plane waves in many directions, none finer than a given period.
+    """A smooth texture: a sum of plane waves in many directions, with a minimum period.
 
-    Channel c is ½ + ½·contrast·mean over the waves of cos(2π(fx·x + fy·y) + phase). It has no detail finer
-    than ``finest``, so sampling theory holds on it, and images of it have closed forms.
+    Channel c is ½ + ½·contrast·mean over the waves of cos(2π(fx·x + fy·y) + phase). The texture is band-limited
+    by ``finest``, so sampling theory applies, and images of it have closed forms.
 
     Args:
         finest: the shortest period, metres; the longest is eight times that.
-        waves: how many for each channel.
+        waves: number of waves for each channel.
         contrast: 0 to 1.
-        seed: of the random directions, periods and phases.
+        seed: seed of the random directions, periods and phases.
     """
 
     finest: float
@@ -134,12 +134,12 @@ class Waves:
 
 @dataclass(frozen=True)
 class Spot:
-    """A round spot of light with a Gaussian profile, opaque in its middle and clear around.
+    """A round spot with a Gaussian profile, opaque at its centre and transparent around it.
 
     Args:
         radius: standard deviation of the profile, metres.
-        colour: linear radiance (red, green, blue) of the middle.
-        middle: place (x, y), metres.
+        colour: linear radiance (red, green, blue) at the centre.
+        middle: centre (x, y), metres.
     """
 
     radius: float
@@ -156,12 +156,12 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """An array of samples on a sheet, interpolated linearly, clear outside.
+    """An array of samples on a sheet, interpolated linearly, transparent outside.
 
     Args:
         values: linear radiance 0 to 1, shape (rows, columns), (rows, columns, 3), or (rows, columns, 4) with
-            opacity last and colour already multiplied by it; row 0 at the top.
-        width: of the sheet, metres; its height keeps the samples square.
+            opacity last and colour multiplied by opacity; row 0 at the top.
+        width: width of the sheet, metres; the height follows from square samples.
 
     Raises:
         InputError: another shape, negative or not finite values, or a width of zero or less.
@@ -187,17 +187,17 @@ class Picture:
     def read(
         cls, path: str | PathLike[str], width: float, *, transfer: Literal["auto", "srgb", "linear"] = "auto"
     ) -> Picture:
-        """The picture in a file, with its opacity where it is a PNG or OpenEXR file that has one.
+        """Read a picture from a file, with opacity for PNG and OpenEXR files that have it.
 
         Args:
-            path: a file that `vcc.files.pictures.read_picture` reads.
-            width: of the sheet, metres.
-            transfer: how stored integers stand for light: ``"srgb"``, as pictures for people do, or ``"linear"``;
-                ``"auto"`` is as the file says, sRGB where it says nothing. Floating point is linear.
+            path: a file supported by `vcc.files.pictures.read_picture`.
+            width: width of the sheet, metres.
+            transfer: transfer function of stored integers: ``"srgb"``, ``"linear"``, or ``"auto"`` for the one
+                in the file's metadata, else sRGB. Floating point is linear.
 
         Raises:
-            InputError: a file that cannot be read or says otherwise than told, an opacity in another kind of file,
-                or a transfer that there is not.
+            InputError: an unreadable file, metadata that contradict ``transfer``, opacity in another kind of
+                file, or an unknown transfer.
         """
         checks.one_of("transfer", transfer, ("auto", "srgb", "linear"))
         seen = _read_with_opacity(Path(path))
@@ -208,13 +208,13 @@ class Picture:
             values = _three(samples.astype(np.float64) / np.iinfo(samples.dtype).max)
         else:
             values = _three(decode(samples).astype(np.float64))
-        # PNG stores colours by themselves, OpenEXR stores them times opacity.
+        # PNG stores straight colours, OpenEXR colours multiplied by opacity.
         factor = opacity[..., None] if samples.dtype.kind == "u" else 1.0
         return cls(np.concatenate([values * factor, opacity[..., None]], axis=-1), width)
 
     @property
     def height(self) -> float:
-        """Of the sheet, metres."""
+        """Height of the sheet, metres."""
         rows, columns = np.shape(self.values)[:2]
         return float(self.width * rows / columns)
 
@@ -225,7 +225,7 @@ class Picture:
     def mean(self, x: Array, y: Array, cell: Array | float) -> Array:
         """Colour times opacity and opacity, (..., 4), averaged over squares about as large as ``cell``, metres.
 
-        Interpolated in a pyramid of pictures, each half as fine as the one before (Williams 1983, mip maps).
+        Interpolates in a mip map, a pyramid of successively halved pictures (Williams 1983).
         """
         shape = np.broadcast_shapes(np.shape(x), np.shape(y), np.shape(cell))
         pitch = self.width / np.shape(self.values)[1]
@@ -244,7 +244,7 @@ class Picture:
         return result
 
     def _halved(self, times: int) -> Array:
-        """The samples with 2^times as large a pitch, or as near to that as whole numbers of samples allow."""
+        """The samples with a pitch 2^times as large, or as close to it as integer sample counts allow."""
         kept: dict[int, Array] = self.__dict__.setdefault("_levels", {})
         if times not in kept:
             values = np.asarray(self.values)
@@ -263,7 +263,7 @@ class Picture:
 
 
 def _averaged(values: Array, axis: int, count: int) -> Array:
-    """Means over ``count`` equal parts of an axis, samples being boxes that parts may cut."""
+    """Means over ``count`` equal parts of an axis; parts may cut samples, which are boxes."""
     moved = np.moveaxis(values, axis, 0)
     total = np.concatenate([np.zeros_like(moved[:1]), np.cumsum(moved, axis=0)])
     border = np.linspace(0, len(moved), count + 1)
@@ -274,12 +274,12 @@ def _averaged(values: Array, axis: int, count: int) -> Array:
 
 
 def _three(values: Array) -> Array:
-    """Grey in three channels."""
+    """Repeat grey in three channels."""
     return np.repeat(values[..., None], 3, axis=-1) if values.ndim == 2 else values
 
 
 def _read_with_opacity(path: Path) -> tuple[Array, Array] | None:
-    """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1; None for a picture without any."""
+    """Samples as stored, (rows, columns[, 3]), and opacity, 0 to 1; None for a picture without opacity."""
     if path.suffix.lower() == ".png":
         samples = read_stored(path)
         if samples.ndim == 3 and samples.shape[2] in (2, 4):
@@ -289,7 +289,7 @@ def _read_with_opacity(path: Path) -> tuple[Array, Array] | None:
     if path.suffix.lower() == ".exr" and path.is_file():
         try:
             channels = read_exr_channels(path)
-        except Exception:  # what is wrong is said below
+        except Exception:  # the caller's next attempt reports the fault
             channels = {}
         if set(channels) == set("RGBA"):
             return np.stack([channels[name] for name in "RGB"], axis=-1), channels["A"].astype(np.float64)
@@ -297,10 +297,10 @@ def _read_with_opacity(path: Path) -> tuple[Array, Array] | None:
 
 
 class Painting:
-    """Shapes laid over one another at given positions: what handsome procedural textures are made of.
+    """Shapes composited at given positions, for procedural textures.
 
-    Positions on a grid (x along the last axis, y along the one before) are recognised: a shape is then only
-    evaluated inside its bounds.
+    If the positions form a grid (x along the last axis, y along the one before), a shape is evaluated only
+    inside its bounds.
 
     Args:
         x: positions, metres.
@@ -318,11 +318,11 @@ class Painting:
         bounds: tuple[float, float, float, float],
         shape: Callable[[Array, Array], tuple[ArrayLike, Colour]],
     ) -> None:
-        """Lay a shape over what is there.
+        """Composite a shape over the painting.
 
         Args:
-            bounds: (left, top, right, bottom) in metres outside which the shape is clear.
-            shape: from positions x, y to its opacity (...), 0 to 1, and colour, (3,) or (..., 3).
+            bounds: (left, top, right, bottom) in metres; the shape is transparent outside.
+            shape: maps positions x, y to opacity (...), 0 to 1, and colour, (3,) or (..., 3).
         """
         left, top, right, bottom = bounds
         inside_x, inside_y = (self.x >= left) & (self.x <= right), (self.y >= top) & (self.y <= bottom)
@@ -348,7 +348,7 @@ class Painting:
     def rectangle(
         self, bounds: tuple[float, float, float, float], colour: Colour, edge: float, opacity: float = 1.0
     ) -> None:
-        """Lay a rectangle over what is there.
+        """Composite a rectangle over the painting.
 
         Args:
             bounds: (left, top, right, bottom), metres.
@@ -365,11 +365,11 @@ class Painting:
         self.paint((left - edge, top - edge, right + edge, bottom + edge), shape)
 
     def disc(self, middle: tuple[float, float], radius: float, colour: Colour, edge: float) -> None:
-        """Lay a disc over what is there.
+        """Composite a disc over the painting.
 
         Args:
-            middle: (x, y), metres.
-            radius: metres.
+            middle: centre (x, y), metres.
+            radius: radius, metres.
             colour: linear radiance.
             edge: width of its soft edge, metres.
         """
@@ -381,12 +381,12 @@ class Painting:
         self.paint((middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach), shape)
 
     def star(self, middle: tuple[float, float], radius: float, spokes: int, colour: Colour, edge: float) -> None:
-        """Lay a Siemens star over what is there: the finer the detail a camera keeps, the smaller its grey heart.
+        """Composite a Siemens star: the better a camera's resolution, the smaller the grey centre in its image.
 
         Args:
-            middle: (x, y), metres.
-            radius: metres.
-            spokes: how many dark spokes.
+            middle: centre (x, y), metres.
+            radius: radius, metres.
+            spokes: number of dark spokes.
             colour: linear radiance of the spokes.
             edge: width of their soft edges, metres.
         """
@@ -402,11 +402,11 @@ class Painting:
         self.paint((middle[0] - reach, middle[1] - reach, middle[0] + reach, middle[1] + reach), shape)
 
     def text(self, text: str, left_top: tuple[float, float], dot: float, colour: Colour) -> None:
-        """Lay letters and digits over what is there, five by seven dots each.
+        """Composite letters and digits over the painting, five by seven dots each.
 
         Args:
             text: capital letters, digits, spaces and hyphens.
-            left_top: (x, y) of the first letter's corner, metres.
+            left_top: (x, y) of the upper left corner of the first letter, metres.
             dot: size of a dot, metres; letters are six dots apart.
             colour: linear radiance.
         """
@@ -425,14 +425,14 @@ def soft(distance: Array, edge: float) -> Array:
     """Opacity near an edge: 0 outside, 1 inside, linear over ``edge`` metres.
 
     Args:
-        distance: from the edge, positive inside, metres.
-        edge: metres.
+        distance: distance from the edge, positive inside, metres.
+        edge: width of the transition, metres.
     """
     return np.clip(distance / edge + 0.5, 0.0, 1.0)
 
 
 def glyphs(text: str) -> NDArray[np.float32]:
-    """Text as dots, shape (7, 6 · letters), 1 where a letter is.
+    """Text as dots, shape (7, 6 · letters), 1 inside letters.
 
     Raises:
         InputError: a character other than capital letters, digits, space and hyphen.
@@ -447,7 +447,7 @@ def glyphs(text: str) -> NDArray[np.float32]:
 
 
 def _span(inside: Array) -> slice | None:
-    """The slice that holds all true entries; positions may run either way."""
+    """The slice that covers all true entries; None if there are none."""
     found = np.flatnonzero(inside)
     return slice(int(found[0]), int(found[-1]) + 1) if found.size else None
 

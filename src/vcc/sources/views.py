@@ -1,4 +1,4 @@
-"""Where the views of a light field are: a planar array of parallel pinhole cameras, and the one of each view."""
+"""Positions of the views of a light field: a planar array of parallel pinhole cameras, one for each view."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from vcc.light_field import LightField
 
 @dataclass(frozen=True)
 class ViewCamera:
-    """The pinhole camera of one view, looking along −z into the scene, its picture shifted and never tilted.
+    """The pinhole camera of one view, looking along −z into the scene; its image is shifted, never tilted.
 
-    A scene's point (X, Y) at distance Z in front of the entrance plane falls into the picture where
-    (X − x)/Z lies between left and right, and (Y − y)/Z between top and bottom.
+    A scene point (X, Y) at distance Z in front of the entrance plane is inside the image if (X − x)/Z lies
+    between left and right, and (Y − y)/Z between top and bottom.
 
     Args:
-        row: which row of views, 0 at the top.
-        column: which column of views, 0 at the left.
-        x: place of the pinhole in the entrance plane, metres to the right.
+        row: row of the view, 0 at the top.
+        column: column of the view, 0 at the left.
+        x: position of the pinhole in the entrance plane, metres to the right.
         y: likewise, metres downwards.
-        left: tangent of the direction in which the left border of the picture looks, rightwards positive.
-        right: of the right border.
-        top: of the upper border, downwards positive.
-        bottom: of the lower border.
+        left: tangent of the viewing direction of the left border, rightwards positive.
+        right: likewise for the right border.
+        top: tangent of the viewing direction of the upper border, downwards positive.
+        bottom: likewise for the lower border.
         pixels: (rows, columns).
     """
 
@@ -47,17 +47,18 @@ class ViewCamera:
 
 @dataclass(frozen=True)
 class CameraArray:
-    """Where the views of a light field are; every source of light fields takes this one description.
+    """Positions of the views of a light field, as all sources of light fields accept them.
 
-    Pinhole cameras in the entrance plane z = 0 on a grid centred on the axis, all looking along −z into the scene.
-    Their pictures are shifted so that the views converge at a distance, or are parallel.
+    Pinhole cameras in the entrance plane z = 0 on a grid centred on the axis, all looking along −z into the
+    scene. Their images are shifted so that the views converge at a distance, or are parallel.
 
     Args:
         views: (rows, columns) of views.
-        pixels: (rows, columns) of a view's pixels.
+        pixels: (rows, columns) of pixels of a view.
         spacing: distance between neighbouring views, metres: one number or (dv, du).
         slope_per_pixel: pixel pitch over focal length: one number or (pt, ps).
-        focus_distance: where the views converge, metres before the entrance plane; infinite for parallel views.
+        focus_distance: distance at which the views converge, metres in front of the entrance plane; infinite if
+            parallel.
 
     Raises:
         InputError: a size, spacing, slope or distance that is not above 0.
@@ -72,7 +73,7 @@ class CameraArray:
     def __post_init__(self) -> None:
         checks.counts("views", self.views, "rows", "columns")
         checks.counts("pixels", self.pixels, "rows", "columns")
-        self.light_field(np.zeros((1, 1, 1, 1), dtype=np.uint8))  # refuses what is impossible
+        self.light_field(np.zeros((1, 1, 1, 1), dtype=np.uint8))  # raises for invalid geometry
 
     @classmethod
     def over_aperture(
@@ -84,17 +85,17 @@ class CameraArray:
         pixels: tuple[int, int] = (500, 500),
         focus_distance: float = math.inf,
     ) -> CameraArray:
-        """Views that fill an aperture: each stands for a cell of it, and the cells together for all of it.
+        """Views that fill an aperture; each view represents one cell of the aperture.
 
         Args:
-            aperture: its side, metres: one number or (height, width).
-            field_of_view: the angle that the width of a picture spans, radians (``40 * vcc.units.deg``).
+            aperture: side of the aperture, metres: one number or (height, width).
+            field_of_view: angle spanned by the width of an image, radians (``40 * vcc.units.deg``).
             views: (rows, columns) of views.
-            pixels: (rows, columns) of a view's pixels; they are square.
-            focus_distance: where the views converge, metres.
+            pixels: (rows, columns) of pixels of a view; pixels are square.
+            focus_distance: distance at which the views converge, metres.
 
         Raises:
-            InputError: an angle that is not between 0 and 180°, or what the class refuses.
+            InputError: an angle that is not between 0 and 180°, or as in the class.
         """
         if not 0 < field_of_view < math.pi:
             raise InputError(
@@ -112,17 +113,17 @@ class CameraArray:
 
     @property
     def spacings(self) -> tuple[float, float]:
-        """(dv, du), metres."""
+        """Distance between neighbouring views, (dv, du), metres."""
         return pair(self.spacing)
 
     @property
     def slopes_per_pixel(self) -> tuple[float, float]:
-        """(pt, ps)."""
+        """Slope per pixel, (pt, ps)."""
         return pair(self.slope_per_pixel)
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """(v, u, t, s) of the light field."""
+        """Shape of the light field, (v, u, t, s)."""
         return (*self.views, *self.pixels)
 
     @property
@@ -134,7 +135,7 @@ class CameraArray:
         """The camera of a view.
 
         Raises:
-            InputError: there is no such view.
+            InputError: no such view.
         """
         if not (0 <= row < self.views[0] and 0 <= column < self.views[1]):
             raise InputError(
@@ -142,7 +143,7 @@ class CameraArray:
             )
         (dv, du), (pt, ps) = self.spacings, self.slopes_per_pixel
         x, y = (column - (self.views[1] - 1) / 2) * du, (row - (self.views[0] - 1) / 2) * dv
-        # Slopes are s = x/F − (k − k₀)·ps, and a ray of slope s comes from the direction −s.
+        # Slopes are s = x/F − (k − k₀)·ps, and a ray of slope s comes from direction −s.
         across, down = self.pixels[1] / 2 * ps, self.pixels[0] / 2 * pt
         aside, below = -x / self.focus_distance, -y / self.focus_distance
         return ViewCamera(
@@ -150,22 +151,22 @@ class CameraArray:
         )
 
     def disparity(self, distance: float) -> float:
-        """Pixels by which a point moves from view to view along u, positive where nearer than the focus.
+        """Displacement of a point from view to view along u in pixels, positive if nearer than the focus.
 
         Args:
-            distance: of the point from the entrance plane, metres.
+            distance: distance of the point from the entrance plane, metres.
         """
         return self.spacings[1] * (1 / distance - 1 / self.focus_distance) / self.slopes_per_pixel[1]
 
     def light_field(
         self, values: Any, disparity_range: tuple[float, float] | None = None, sample: Sample = "mean"
     ) -> LightField:
-        """The light field of pictures that these cameras took.
+        """The light field of images taken by these cameras.
 
         Args:
             values: shape (v, u, t, s) or (v, u, t, s, channels).
             disparity_range: see `vcc.LightField`.
-            sample: ``"mean"`` as renderers give it, or ``"point"`` of a formula evaluated at pixels' middles.
+            sample: ``"mean"`` as renderers give it, or ``"point"`` for a formula evaluated at pixel centres.
         """
         return LightField.from_views(
             values, self.spacings, self.slopes_per_pixel, self.focus_distance, disparity_range, sample

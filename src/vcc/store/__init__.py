@@ -1,4 +1,4 @@
-"""Light fields and their videos on disk: Zarr v3 groups, written view by view, read in pieces (docs/store.md)."""
+"""Light fields and light field videos on disk: Zarr v3 groups, written per view, read in parts (docs/store.md)."""
 
 from vcc.store.compression import Lossless, Lossy
 from vcc.store.converting import convert

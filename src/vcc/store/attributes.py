@@ -1,4 +1,4 @@
-"""What a store states beside its samples: frame, units, transfer, names, provenance; see docs/store.md."""
+"""Attributes of a store: frame, units, transfer function, names, provenance; see docs/store.md."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from vcc.fields.grid import Sample
 from vcc.store.held import IDENTITY
 
 FORMAT_VERSION = 1
-"""Of the attributes and the layout below; a reader refuses what is newer than it knows."""
+"""Version of the attributes and the layout below; readers do not support newer versions."""
 KEY = "light_field"
-"""The attribute of the group under which all others stand."""
+"""The attribute of the group that contains all others."""
 ARRAY = "samples"
 """The name of the array in the group."""
 AXES = ("v", "u", "t", "s", "channel")
 UNITS = {"u": "m", "v": "m", "s": "1", "t": "1"}
 PICTURES = "vcc.picture"
-"""How Zarr calls the codec of `vcc.store.picture_codec`."""
+"""Name of the codec of `vcc.store.picture_codec` in Zarr."""
 DTYPES = ("uint8", "uint16", "float16", "float32")
 
 SETTINGS = "settings"
-"""Under which the description of a store keeps how it was made, beside what the maker said."""
+"""Key in a store's description for the settings of the store, next to the description of its maker."""
 
 Transfer = Literal["linear", "srgb"]
 
@@ -41,16 +41,16 @@ class Attributes(Brief):
     """The attributes of a store.
 
     Args:
-        frame: 5×5, from indices (i, j, k, l, 1) to rays (u, v, s, t, 1), metres and slopes.
-        transfer: ``"linear"``: samples are proportional to light; ``"srgb"``: they are codes of IEC 61966-2-1.
-        channel_names: one for each channel, or None.
-        disparity_range: (lowest, highest), pixels per view along u, or None where not known.
-        provenance: where the light field comes from, as JSON can hold it.
-        description: all that the samples depend on, as JSON can hold it, so that views are never mixed; or None.
-        lossy: codec, quality and measured PSNR, or None where samples are kept exactly.
-        complete: whether all views are there.
-        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; stores that do not state it hold means.
-        identity: drawn when the store was made (`vcc.store.held`); None of those that are older.
+        frame: 5×5 matrix, from indices (i, j, k, l, 1) to rays (u, v, s, t, 1), metres and slopes.
+        transfer: ``"linear"``: samples are proportional to light; ``"srgb"``: samples are codes of IEC 61966-2-1.
+        channel_names: a name for each channel, or None.
+        disparity_range: (lowest, highest), pixels per view along u; None if unknown.
+        provenance: origin of the light field, as JSON data.
+        description: everything that the samples depend on, as JSON data, so that views are never mixed; or None.
+        lossy: codec, quality and measured PSNR; None for lossless samples.
+        complete: whether all views are present.
+        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` for stores without this attribute.
+        identity: a random text drawn when the store is made (`vcc.store.held`); None for older stores.
     """
 
     frame: Affine
@@ -65,7 +65,7 @@ class Attributes(Brief):
     identity: str | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """The attributes as they are written."""
+        """The attributes as JSON data."""
         return {
             "format_version": FORMAT_VERSION,
             IDENTITY: self.identity,
@@ -84,10 +84,10 @@ class Attributes(Brief):
 
     @classmethod
     def from_json(cls, stated: Any, path: Path) -> Attributes:
-        """The attributes of the store at ``path``.
+        """Read the attributes of the store at ``path``.
 
         Raises:
-            InputError: not ours, a newer version, or something missing or impossible (named).
+            InputError: not a light field, a newer version, or an attribute that is missing or invalid (named).
         """
         if not isinstance(stated, dict):
             raise InputError(
@@ -126,10 +126,10 @@ class Attributes(Brief):
         return made
 
     def check(self, owner: str, channels: int | Literal["unknown"] | None = "unknown") -> None:
-        """Refuse what no light field has.
+        """Raise for attributes that no light field has.
 
         Raises:
-            InputError: said of ``owner``.
+            InputError: an invalid attribute; the message starts with ``owner``.
         """
         if self.frame.dimensions != 4 or not self.frame.is_invertible():
             raise InputError(f"{owner}: frame is an invertible 5×5 map of indices to rays, not\n{self.frame!r}")
@@ -150,20 +150,20 @@ class Attributes(Brief):
             )
 
     def finished(self, lossy: dict[str, Any] | None) -> Attributes:
-        """The same of a store with all its views."""
+        """Copy of the attributes for a complete store."""
         return replace(self, complete=True, lossy=lossy)
 
 
 def written_here() -> dict[str, Any]:
-    """The provenance of what nobody says more about."""
+    """Default provenance."""
     return {"written_by": f"vcc {VERSION}"}
 
 
 def plain(value: Any, name: str) -> Any:
-    """A value as JSON holds it: tuples are lists, and numbers that are not finite are the words of Zarr for them.
+    """A value as JSON data: tuples become lists, and non-finite numbers the texts that Zarr uses for them.
 
     Raises:
-        InputError: it holds what JSON cannot.
+        InputError: JSON cannot represent the value.
     """
     if isinstance(value, dict):
         return {str(key): plain(item, f"{name}.{key}") for key, item in value.items()}
@@ -185,12 +185,12 @@ def plain(value: Any, name: str) -> Any:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two plain values are the same, whatever the order of keys."""
+    """Whether two JSON values are equal, regardless of the order of keys."""
     return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
 
 
 def difference(there: Any, wanted: Any, name: str = "") -> str:
-    """Where two descriptions differ first, in words."""
+    """Text for the first difference between two descriptions."""
     if isinstance(there, dict) and isinstance(wanted, dict):
         for key in [*there, *(key for key in wanted if key not in there)]:
             if not same(there.get(key), wanted.get(key)):

@@ -1,8 +1,8 @@
-"""The chunks of a view's file, read and unpacked at once where they are packed as ours are.
+"""Direct reading of the chunks of a view's file, for files in the layout of this package.
 
-Zarr hands each chunk to an event loop that all threads of a process share: about half a millisecond a chunk of
-128 KiB, several times what reading and unpacking take, and two threads wait for it as long as one. Here each
-thread reads for itself, and only the chunks that it needs. What is packed in any other way Zarr reads.
+Zarr passes each chunk to an event loop that all threads of a process share: about half a millisecond per chunk
+of 128 KiB, several times the time for reading and decompression, and without speed-up from two threads. Here
+each thread reads only the chunks that it needs. Zarr reads files with other codecs.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 NOT_THERE = 2**64 - 1
-"""How the index of a Zarr shard says that a chunk was never written."""
+"""Entry in the index of a Zarr shard for a chunk that was never written."""
 INDEX, CHECK, BLOSC = 16, 4, 16
-"""Bytes: of a chunk in the index of a shard (place, size), of a checksum, of the head of what Blosc packed."""
+"""Bytes of an index entry (offset, size), of a checksum, and of the header of a Blosc buffer."""
 
 Range = tuple[int, int]
 
 
 def sharding(array: Any) -> dict[str, Any]:
-    """The configuration of a Zarr array's sharding codec; empty for none."""
+    """The configuration of a Zarr array's sharding codec; empty if there is none."""
     for codec in array.metadata.to_dict()["codecs"]:
         if codec["name"] == "sharding_indexed":
             return dict(codec["configuration"])
@@ -35,14 +35,14 @@ def sharding(array: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Chunked:
-    """How the file of a view is cut into chunks, each packed by itself.
+    """Layout of a view's file in separately compressed chunks.
 
     Args:
-        view: (rows, columns[, channels]) of pixels of a view.
-        chunk: likewise, of a chunk; those at the end of a view go on beyond it.
-        counts: how many chunks there are along each axis.
-        at_end: whether the index of the chunks stands at the end of the file, or else at its beginning.
-        kind: of the samples as they lie in the file; None where Zarr alone knows how they are packed.
+        view: (rows, columns[, channels]) of a view in pixels.
+        chunk: likewise for a chunk; the last chunks of a view extend beyond it.
+        counts: number of chunks along each axis.
+        at_end: whether the index of the chunks is at the end of the file; else at its beginning.
+        kind: type of the samples in the file; None if only Zarr can decode the chunks.
     """
 
     view: tuple[int, ...]
@@ -53,7 +53,7 @@ class Chunked:
 
     @classmethod
     def of(cls, array: Any) -> Self | None:
-        """How a Zarr array of light-field samples is cut; None where a view is one chunk without an index."""
+        """The layout of a Zarr array of light field samples; None if each view is one chunk without an index."""
         if array.shards is None:
             return None
         stated = sharding(array)
@@ -70,10 +70,10 @@ class Chunked:
         )
 
     def index(self, file: Path) -> NDArray[np.uint64]:
-        """(place, size) in bytes of each chunk of a file, (chunks, 2).
+        """(offset, size) in bytes of each chunk of a file, shape (chunks, 2).
 
         Raises:
-            ValueError: it is cut off, or a chunk was never written: Zarr would read zeros there.
+            ValueError: the file is truncated, or a chunk was never written (Zarr would read it as zeros).
         """
         chunks, size = math.prod(self.counts), file.stat().st_size
         index_size = INDEX * chunks + CHECK
@@ -91,18 +91,18 @@ class Chunked:
         return index
 
     def read(self, file: Path, rows: Range, columns: Range) -> NDArray[Any]:
-        """Some pixels of a view, of whose file the chunks that hold them are read and no others.
+        """Read some pixels of a view; only the chunks that contain them are read.
 
         Args:
-            file: of the view.
+            file: file of the view.
             rows: first row of pixels and the row after the last.
             columns: likewise.
 
         Returns:
-            (rows, columns[, channels]), as stored.
+            Shape (rows, columns[, channels]), as stored.
 
         Raises:
-            ValueError: the file is cut off or damaged, or holds something else.
+            ValueError: the file is truncated, damaged or of another format.
         """
         assert self.kind is not None
         index = self.index(file).reshape(*self.counts, 2)
@@ -118,7 +118,7 @@ class Chunked:
         return room.astype(self.kind.newbyteorder("="), copy=False)
 
     def _unpacked(self, stream: Any, place: int, size: int) -> NDArray[Any]:
-        """The chunk that lies somewhere in a file."""
+        """Read and decompress the chunk at an offset."""
         import imagecodecs
 
         assert self.kind is not None
@@ -127,7 +127,7 @@ class Chunked:
         if len(packed) != size or size < BLOSC + CHECK:
             raise ValueError(f"no chunk of {size:,} bytes lies at {place:,}")
         _check(packed, "a chunk")
-        samples, _, whole = struct.unpack_from("<III", packed, 4)  # what Blosc says of itself
+        samples, _, whole = struct.unpack_from("<III", packed, 4)  # sizes in Blosc's header
         bytes_each = math.prod(self.chunk) * self.kind.itemsize
         if samples != bytes_each or whole != size - CHECK:
             raise ValueError(f"a chunk of {bytes_each:,} bytes says that it has {samples:,}, packed {whole:,}")
@@ -135,16 +135,16 @@ class Chunked:
 
     @property
     def _most(self) -> int:
-        """Bytes that no packed chunk exceeds: what cannot be packed Blosc keeps as it is."""
+        """Maximum size of a compressed chunk: Blosc stores incompressible data unchanged."""
         assert self.kind is not None
         return math.prod(self.chunk) * self.kind.itemsize + BLOSC + CHECK
 
 
 def _check(packed: bytes, what: str) -> None:
-    """Hold bytes against the checksum at their end.
+    """Compare bytes with the checksum at their end.
 
     Raises:
-        ValueError: they are others.
+        ValueError: the checksum differs.
     """
     import google_crc32c
 
@@ -153,7 +153,7 @@ def _check(packed: bytes, what: str) -> None:
 
 
 def _copy(chunk: NDArray[Any], start: list[int], room: NDArray[Any], ends: list[Range]) -> None:
-    """Put into a room, which holds what lies between some ends, what a chunk that begins at a place has of it."""
+    """Copy the overlap of a chunk that begins at ``start`` into ``room``, which covers the ranges ``ends``."""
     shared = [
         (max(at, first), min(at + size, stop))
         for at, size, (first, stop) in zip(start, chunk.shape, ends, strict=True)

@@ -1,4 +1,4 @@
-"""How the samples of a store are packed: without loss by default, as pictures with loss on request."""
+"""Compression of a store's samples: lossless by default, lossy picture codecs on request."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from vcc.base.errors import InputError
 from vcc.store.attributes import PICTURES
 
 CHUNK_BYTES = 2**17
-"""About how many bytes of samples an inner chunk holds: some rows of pixels of one view."""
+"""Approximate size of an inner chunk's samples in bytes: some rows of pixels of one view."""
 
 FLAT = {"name": "default", "separator": "."}
-"""All views are files of one folder, c.2.3.0.0: five folders for each take longer to write, settle and remove."""
+"""Chunk keys for one folder of all views, c.2.3.0.0: five nested folders a view are slower to write and remove."""
 
 
 @dataclass(frozen=True)
 class Lossless:
-    """Samples are kept exactly: bytes shuffled and packed by Blosc.
+    """Lossless compression: shuffled bytes, compressed by Blosc.
 
-    Measured once on a slow core that others used too, 64 rows of 500 pixels at a time, as times smaller and MB/s
-    written: the demo's scene as float32 3.0 and 170 (lz4: 2.6 and 530), as float16 3.9 and 150 (2.8 and 990);
+    Compression factor and write speed in MB/s, measured once on a slow shared core, 64 rows of 500 pixels at a
+    time: the demo's scene as float32 3.0 and 170 (lz4: 2.6 and 530), as float16 3.9 and 150 (2.8 and 990);
     ``hci_antinous``, 8 bits, 2.2 and 90 (1.3 and 580). Reading ran at 580 to 1070 MB/s. Level 1 wrote up to 2.7
-    times as fast and was 5 to 28 % larger, level 5 about half as fast and 0.5 to 7 % smaller. Bits shuffled
+    times as fast and was 5 to 28 % larger, level 5 about half as fast and 0.5 to 7 % smaller. Shuffling bits
     instead of bytes made all but one larger (``stanford_cards_9x9``: 5 % smaller).
 
     Args:
-        codec: ``"zstd"``, or ``"lz4"``, which is faster and packs less.
+        codec: ``"zstd"``, or ``"lz4"``, which is faster and compresses less.
         level: 0 (fastest) to 9 (smallest).
 
     Raises:
@@ -46,20 +46,20 @@ class Lossless:
 
     @property
     def words(self) -> str:
-        """What this is, for people."""
+        """Text for people."""
         return f"lossless ({self.codec}, level {self.level})"
 
 
 @dataclass(frozen=True)
 class Lossy:
-    """Each view is kept as a picture, smaller and changed; how much is measured and stated (PSNR).
+    """Lossy compression: each view is stored as a picture; the loss is measured and recorded (PSNR).
 
-    For 8 bits (JPEG XL also 16), grey or three channels. The codecs take codes to be sRGB: keep such in the store
-    (``transfer="srgb"``), or dark parts suffer. A view is then read as a whole, also for a part of it.
+    For 8 bits (JPEG XL also 16), grey or three channels. The codecs assume sRGB codes: store sRGB
+    (``transfer="srgb"``), or dark regions lose quality. Reading a part of a view decodes the whole view.
 
     Args:
         codec: ``"jpegxl"`` or ``"avif"`` (8 bits, three channels).
-        quality: 1 (small) to 99 (hardly changed), as the codec counts it.
+        quality: 1 (small) to 99 (hardly changed), on the scale of the codec.
 
     Raises:
         InputError: another codec or quality.
@@ -75,14 +75,14 @@ class Lossy:
 
     @property
     def words(self) -> str:
-        """What this is, for people."""
+        """Text for people."""
         return f"{'JPEG XL' if self.codec == 'jpegxl' else 'AVIF'}, quality {self.quality}"
 
     def check(self, kind: np.dtype[Any], channels: int | None) -> None:
-        """Refuse samples that the codec cannot hold.
+        """Raise for samples that the codec does not support.
 
         Raises:
-            InputError: their type, or how many channels there are.
+            InputError: an unsupported type or number of channels.
         """
         if kind.name not in ("uint8", "uint16"):
             raise InputError(
@@ -100,7 +100,7 @@ Compression = Lossless | Lossy
 
 
 Pixels = int | tuple[int, int]
-"""How many pixels are packed together: rows of them, or (rows, columns)."""
+"""Size of a chunk in pixels: rows, or (rows, columns)."""
 
 
 def chunk_pixels(view: tuple[int, ...], bytes_each: int, wanted: Pixels | None) -> tuple[int, int]:
@@ -109,7 +109,7 @@ def chunk_pixels(view: tuple[int, ...], bytes_each: int, wanted: Pixels | None) 
     Args:
         view: (rows, columns[, channels]) of a view.
         bytes_each: bytes of a number.
-        wanted: what was asked for; None takes whole rows, all chunks of a view nearly alike, by `CHUNK_BYTES`.
+        wanted: the requested size; None for whole rows in chunks of nearly equal height, see `CHUNK_BYTES`.
 
     Raises:
         InputError: a number below 1.
@@ -125,14 +125,14 @@ def chunk_pixels(view: tuple[int, ...], bytes_each: int, wanted: Pixels | None) 
 
 
 def know_pictures() -> None:
-    """Tell Zarr of the codec that keeps views as pictures, which loads Zarr: it is a class of its kind."""
+    """Register the picture codec with Zarr. The codec derives from a class of Zarr, so this imports Zarr."""
     lazy_import.module("vcc.store.picture_codec")
 
 
 def layout(
     shape: tuple[int, ...], kind: np.dtype[Any], compression: Compression, chunks: Pixels | None
 ) -> dict[str, Any]:
-    """How an array of this shape is cut and packed, as arguments of `zarr.Group.create_array`."""
+    """Chunks and codecs for an array of this shape, as arguments of `zarr.Group.create_array`."""
     from zarr.codecs import BloscCodec, Crc32cCodec
 
     if isinstance(compression, Lossy):
@@ -154,5 +154,5 @@ def layout(
         "chunks": (1, 1, *inner, *shape[4:]),
         "shards": (1, 1, *whole, *shape[4:]),
         "chunk_key_encoding": FLAT,
-        "compressors": [blosc, Crc32cCodec()],  # packed bytes that rot are found out
+        "compressors": [blosc, Crc32cCodec()],  # the checksum detects damaged data
     }

@@ -1,4 +1,4 @@
-"""A light field written to a store with samples of another type, packed otherwise, or just packed."""
+"""Writing a light field to a store, optionally with another sample type or compression."""
 
 from __future__ import annotations
 
@@ -41,20 +41,22 @@ def convert(
     """Write a light field to a store, view by view: a source on disk is never in memory as a whole.
 
     Args:
-        source: in memory or on disk.
+        source: a light field in memory or on disk.
         path: folder of the store.
-        transfer: of a source in memory: ``"srgb"`` if its integers are sRGB codes. One on disk says it itself.
-        dtype: of the stored samples; None keeps them bit for bit. Floating point holds linear light, and integers
-            made of it are sRGB codes; from 8 to 16 bits and back they stay what they were.
-        provenance: where it comes from; None takes that of a source on disk.
+        transfer: for a source in memory: ``"srgb"`` if its integers are sRGB codes. A source on disk states its
+            own.
+        dtype: type of the stored samples; None keeps the samples bit for bit. Floating point stores linear
+            light; conversion from floating point to integers gives sRGB codes. Between 8 and 16 bits the
+            transfer function is kept.
+        provenance: origin of the light field; None keeps the provenance of a source on disk.
         chunks: see `vcc.store.create_store`.
-        compression: see there.
+        compression: see `vcc.store.create_store`.
         overwrite: see `vcc.store.save_store`.
         progress: called with (done, total) in views.
 
     Raises:
-        InputError: another type; samples that it cannot hold, brighter than 1 as integers (named by view); a store
-            that is not complete; what `vcc.store.save_store` refuses.
+        InputError: an unsupported type; samples outside its range, above 1 for integers (the view is named); an
+            incomplete source; or as in `vcc.store.save_store`.
     """
     kept = as_kept(source, transfer, dtype)
     return write_views(
@@ -73,14 +75,14 @@ def convert(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Kept(Brief):
-    """A light field as a store is to keep it.
+    """A light field in the form in which a store keeps it.
 
     Args:
-        grid: with the type that is stored.
-        view: the samples of view (row, column), as they are stored.
-        transfer: how they stand for light.
-        channel_names: where stated.
-        provenance: where it comes from.
+        grid: grid with the stored type.
+        view: function that returns the samples of view (row, column), as stored.
+        transfer: transfer function of the stored samples.
+        channel_names: a name for each channel, or None.
+        provenance: origin of the light field.
     """
 
     grid: Grid
@@ -91,17 +93,17 @@ class Kept(Brief):
 
 
 def as_kept(source: Samples, transfer: Transfer, dtype: DTypeLike | None) -> Kept:
-    """A light field as a store is to keep it; for the arguments see `convert`.
+    """Prepare a light field for a store; for the arguments see `convert`.
 
     Raises:
-        InputError: another type than stores have, or a store that is not complete.
+        InputError: a type that stores do not support, or an incomplete source.
     """
     grid = source.grid
     view: View = partial(one_view, source)
     kind, names, made = grid.kind, None, written_here()
     if isinstance(source, StoredLightField):
         source.check_complete()
-        view = partial(source.stored_view, first=0, stop=grid.shape[2])  # as stored: codes stay codes
+        view = partial(source.stored_view, first=0, stop=grid.shape[2])  # as stored: integer codes are not decoded
         kind, transfer, names, made = source.dtype, source.transfer, source.channel_names, source.provenance
     wanted = kind if dtype is None else np.dtype(dtype)
     if wanted.name not in DTYPES:
@@ -117,18 +119,18 @@ def as_kept(source: Samples, transfer: Transfer, dtype: DTypeLike | None) -> Kep
 def _recoding(
     kind: np.dtype[Any], transfer: Transfer, wanted: np.dtype[Any]
 ) -> tuple[Callable[[NDArray[Any], str], NDArray[Any]], Transfer]:
-    """How samples become samples of another type, and how these then stand for light."""
+    """The function that converts samples to another type, and the transfer function of its result."""
     if wanted == kind:
         return lambda view, name: view, transfer
     if kind.kind == "u" and wanted.kind == "u":
-        # 65535 = 255 · 257: 8 bits come back as they were.
+        # 65535 = 255 · 257: the round trip from 8 bits is exact.
         if wanted.itemsize > kind.itemsize:
             return lambda view, name: view.astype(wanted) * wanted.type(257), transfer
         return lambda view, name: np.rint(view / 257.0).astype(wanted), transfer
     if kind.kind == "u":
         return lambda view, name: _light(view, transfer).astype(wanted), "linear"
     if wanted.kind == "f":
-        return lambda view, name: view, "linear"  # the writer brings it to its precision, and checks that it fits
+        return lambda view, name: view, "linear"  # the writer rounds to its precision and checks the range
 
     def coded(view: NDArray[Any], name: str) -> NDArray[Any]:
         brightest = float(view.max())

@@ -1,4 +1,4 @@
-"""Disparity maps kept in a store beside the samples, so that they are found once; see docs/store.md."""
+"""Disparity maps saved in a store next to the samples, so that they are computed once; see docs/store.md."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ FOLDER = "disparity"
 
 
 def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
-    """The maps that a store holds, or None.
+    """Read the maps in a store; None if there are none.
 
     Args:
-        store: its folder.
-        shape: of its samples.
+        store: folder of the store.
+        shape: shape of the samples.
 
     Raises:
-        InputError: maps that are damaged or of another shape.
+        InputError: the maps are damaged or have another shape.
     """
     folder = store / FOLDER
     if not folder.is_dir():
@@ -48,7 +48,7 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
         values = np.asarray(read_array(folder, array, slice(None), places, "disparity maps"))
         stated: Any = array.attrs["views"]
         views = tuple((float(row), float(column)) for row, column in stated)
-        unmatched: Any = array.attrs.get("unmatched", 0.0)  # stores of before have none
+        unmatched: Any = array.attrs.get("unmatched", 0.0)  # older stores have none
         maps = DisparityMaps(values, views, str(array.attrs["source"]), unmatched=float(unmatched))
     except Exception as error:
         raise InputError(
@@ -59,11 +59,11 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
 
 
 def keep_maps(store: Path, maps: DisparityMaps) -> None:
-    """Write maps into a store; they appear whole or not at all, and maps that are there stay.
+    """Write maps into a store, atomically; existing maps are kept.
 
     Args:
-        store: its folder.
-        maps: with what they were made by.
+        store: folder of the store.
+        maps: the maps, with their source.
 
     Raises:
         OSError: the disk refuses.
@@ -89,7 +89,7 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
         try:
             part.rename(folder)
         except OSError:
-            if not folder.is_dir():  # somebody else was faster
+            if not folder.is_dir():  # another process was faster
                 raise
     finally:
         shutil.rmtree(part, ignore_errors=True)

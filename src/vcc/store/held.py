@@ -1,8 +1,8 @@
-"""What a reader holds on to: that what stands under a name is still what it opened.
+"""Checks that an open store or video has not been replaced.
 
-A folder of Zarr may be replaced, or removed and written again, while it is read: metadata that were read and
-samples that are read next would then belong to two. Each states an identity, drawn when it was made, which
-stays while a writer goes on with it; what is older is told by all that it states.
+A Zarr folder may be replaced, or removed and rewritten, while it is read; metadata and samples would then come
+from different light fields. Each folder states an identity, drawn when it was made, which stays the same when a
+writer continues it. Older folders without an identity are identified by all their attributes.
 """
 
 from __future__ import annotations
@@ -21,28 +21,27 @@ from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json, value_at
 
 IDENTITY = "identity"
-"""The attribute that says which one it is."""
+"""The attribute for the identity."""
 
 Stamp = tuple[int, ...]
 
 
 def drawn() -> str:
-    """An identity for what is made now."""
+    """A new random identity."""
     return secrets.token_hex(16)
 
 
 @dataclass
 class Held:
-    """What stands in a folder, as it was when it was opened.
+    """The content of a folder as it was when it was opened.
 
-    Looked at is the file that states it, and read only where that is another file than before: a look costs one
-    question to the disk.
+    A check is one call of ``stat``; the metadata file is read again only if ``stat`` shows a change.
 
     Args:
-        folder: of a group of Zarr.
-        what: it is, for messages.
-        states: what tells one from another, of a folder.
-        attributes: a hash of the folder's attributes when it was opened.
+        folder: folder of a Zarr group.
+        what: noun for messages.
+        states: function that returns the identifying attributes of a folder.
+        attributes: a hash of these attributes when the folder was opened.
     """
 
     folder: Path
@@ -53,15 +52,15 @@ class Held:
 
     @classmethod
     def now(cls, folder: Path, what: str, states: Callable[[Path], Any]) -> Held:
-        """What stands there now."""
-        seen = _stamp(folder)  # before it is read: what comes in between is then looked at
+        """The current content of a folder."""
+        seen = _stamp(folder)  # stat before reading, so that a later change is noticed
         return cls(folder, what, states, _described(folder, states), seen)
 
     def check(self) -> None:
-        """Refuse another one, or none, in its place.
+        """Raise if the folder was removed or has other content.
 
         Raises:
-            InputError: there is; or it cannot be read any more.
+            InputError: the folder was replaced, removed or became unreadable.
         """
         seen = _stamp(self.folder)
         if seen is not None and seen == self._seen:
@@ -80,27 +79,27 @@ class Held:
 
     @contextmanager
     def through(self) -> Iterator[None]:
-        """Read within this: all that was read is of what was opened, and faults are told by their cause.
+        """Context for reading: raises on exit, or in place of an error within, if the folder was replaced.
 
         Raises:
-            InputError: as `check`; else as raised within.
+            InputError: as in `check`; else the error raised within.
         """
         try:
             yield
         except InputError:
             self.check()
             raise
-        self.check()  # once it is read: that it was there before says nothing
+        self.check()  # after reading: a check before it proves nothing
 
 
 def attributes_of(folder: Path, key: str, array: str | None = None, but: tuple[str, ...] = ()) -> Any:
-    """What a group of Zarr states under a key, and an array in it, as far as that stays the same.
+    """The constant attributes of a Zarr group under a key, and the constant metadata of an array in it.
 
     Args:
-        folder: of the group.
-        key: of its attributes.
-        array: its name, where it is as it was made; its own attributes are left out.
-        but: what writers that go on change.
+        folder: folder of the group.
+        key: key in the attributes of the group.
+        array: name of an array whose metadata do not change; its own attributes are left out. None for no array.
+        but: names that a continuing writer changes.
     """
     group = value_at(read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}"), "attributes", key)
     stays = _without(group, *but) if isinstance(group, dict) else None
@@ -111,21 +110,21 @@ def attributes_of(folder: Path, key: str, array: str | None = None, but: tuple[s
 
 
 def _without(stated: dict[str, Any], *but: str) -> dict[str, Any]:
-    """What is stated; null is as good as nothing."""
+    """Drop the given names, and entries that are null."""
     return {name: value for name, value in stated.items() if name not in but and value is not None}
 
 
 def _stamp(folder: Path) -> Stamp | None:
-    """What is another where a file was written again or replaced; None where there is none."""
+    """A value that changes when the metadata file is rewritten or replaced; None if there is no file."""
     try:
-        found = os.stat(f"{folder}{os.sep}zarr.json")  # noqa: PTH116  (asked often, and text takes half the time)
+        found = os.stat(f"{folder}{os.sep}zarr.json")  # noqa: PTH116  (called often; text is twice as fast)
     except (OSError, ValueError):
         return None
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns, found.st_ctime_ns
 
 
 def _described(folder: Path, states: Callable[[Path], Any]) -> str:
-    """A word for what a folder tells; what is wrong with it others say."""
+    """A hash of the identifying attributes; invalid attributes are reported elsewhere."""
     try:
         stated = states(folder)
     except InputError:

@@ -1,4 +1,4 @@
-"""A Zarr v3 codec that keeps a view as a picture, JPEG XL or AVIF, with loss."""
+"""A lossy Zarr v3 codec that stores a view as a picture, JPEG XL or AVIF."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from vcc.store.attributes import PICTURES
 
 @dataclass(frozen=True)
 class PictureCodec(ArrayBytesCodec):
-    """One chunk (1, 1, rows, columns[, channels]) as one picture file.
+    """Stores one chunk (1, 1, rows, columns[, channels]) as one picture file.
 
     Args:
         codec: ``"jpegxl"`` or ``"avif"``.
-        quality: 1 to 99, as the codec counts it; readers need not know it.
+        quality: 1 to 99, on the scale of the codec; readers do not need it.
     """
 
     is_fixed_size: ClassVar[bool] = False  # type: ignore[misc]
@@ -45,7 +45,7 @@ class PictureCodec(ArrayBytesCodec):
         return {"name": PICTURES, "configuration": {"codec": self.codec, "quality": self.quality}}
 
     def compute_encoded_size(self, input_byte_length: int, _chunk_spec: ArraySpec) -> int:
-        """Not known beforehand."""
+        """Not supported: the size is unknown before encoding."""
         raise NotImplementedError
 
     async def _decode_single(self, chunk_data: Buffer, chunk_spec: ArraySpec) -> NDBuffer:
@@ -64,7 +64,7 @@ class PictureCodec(ArrayBytesCodec):
         return bytes(imagecodecs.avif_encode(view, level=self.quality, speed=8, pixelformat="444"))
 
     def _decoded(self, packed: bytes, out: NDArray[Any]) -> NDArray[Any]:
-        """The picture; the libraries refuse one of another size or type before they unpack it."""
+        """Decode the picture into ``out``; the libraries raise for another size or type before decompression."""
         decode = imagecodecs.jpegxl_decode if self.codec == "jpegxl" else imagecodecs.avif_decode
         return np.asarray(decode(packed, out=out))
 

@@ -1,4 +1,4 @@
-"""Opening a store: what it states at once, its samples when they are asked for."""
+"""Opening a store: metadata are read at once, samples on access."""
 
 from __future__ import annotations
 
@@ -48,25 +48,25 @@ from vcc.store.held import Held, attributes_of
 from vcc.store.video_layout import VIDEO, places
 
 MEASURED_BYTES = 2**26
-"""Views from which disparities are measured are cut to a band of rows if they take more than this as stored."""
+"""Views for measuring disparities are cut to a band of rows if they exceed this number of bytes as stored."""
 MEASURED_REACH = 3
-"""How many views on either side of the middle one disparities are measured from; see `vcc.fields.parallax`."""
+"""Number of views on either side of the middle one for measuring disparities; see `vcc.fields.parallax`."""
 MOST_VIEWS = 2**18
-"""Of a store: which of them are there is looked up one by one, and metadata may state any number."""
+"""Maximum number of views of a store: each file is checked individually, and metadata may state any number."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StoredLightField(OnGrid):
-    """A light field on disk: a part of it is read when it is asked for, and no other.
+    """A light field on disk; parts are read on access.
 
-    ``stored[2:4, :, 100:200]`` reads a part and gives a `vcc.LightField` in its place. Cameras take a stored light
-    field as they take one in memory; `vcc.Camera.capture` reads it in pieces within its ``memory_limit``.
+    ``stored[2:4, :, 100:200]`` reads a part and returns a `vcc.LightField` at the same position. Cameras accept
+    stored light fields; `vcc.Camera.capture` reads them in pieces within its ``memory_limit``.
 
     Args:
         path: folder of the store.
-        attributes: what it states; see `vcc.store.attributes.Attributes`.
+        attributes: the attributes of the store; see `vcc.store.attributes.Attributes`.
         array: the Zarr array of samples.
-        held: that the store which is read is the one that was opened; None in the hands of its writer.
+        held: checks that the store has not been replaced since it was opened; None inside its writer.
     """
 
     path: Path
@@ -77,7 +77,7 @@ class StoredLightField(OnGrid):
     @property
     @cached
     def grid(self) -> Grid:
-        """The light field without its samples: cameras compile it, and a piece of it costs nothing."""
+        """The light field without its samples, for planning cameras and parts."""
         return Grid(
             self.shape,
             self.frame,
@@ -88,7 +88,7 @@ class StoredLightField(OnGrid):
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Its address: whoever gets it opens the store for himself."""
+        """Pickle path and attributes: the receiver opens the store itself."""
         stated = None if self.held is None else self.held.attributes
         return _opened_elsewhere, (self.path.absolute(), self.attributes, stated)
 
@@ -99,13 +99,13 @@ class StoredLightField(OnGrid):
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the samples as stored; see ``transfer``."""
+        """Type of the samples as stored; see ``transfer``."""
         kind: np.dtype[Any] = np.dtype(self.array.dtype)
         return kind
 
     @property
     def read_dtype(self) -> np.dtype[Any]:
-        """Of the samples as they are read: linear, so that sRGB codes become float32."""
+        """Type of the samples as read: linear, so sRGB codes become float32."""
         return np.dtype(np.float32) if self.transfer == "srgb" else self.dtype
 
     @property
@@ -115,52 +115,52 @@ class StoredLightField(OnGrid):
 
     @property
     def transfer(self) -> Transfer:
-        """``"linear"`` or ``"srgb"``: how stored numbers stand for light. What is read is linear always."""
+        """Transfer function of the stored samples, ``"linear"`` or ``"srgb"``. Reading returns linear values."""
         return self.attributes.transfer
 
     @property
     def channel_names(self) -> tuple[str, ...] | None:
-        """One for each channel, where stated."""
+        """A name for each channel; None if not stated."""
         return self.attributes.channel_names
 
     @property
     def disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest) in pixels per view along u, where stated."""
+        """(lowest, highest) in pixels per view along u; None if not stated."""
         return self.attributes.disparity_range
 
     @property
     def sample(self) -> Sample:
-        """What a sample says of the scene; see `vcc.LightField`."""
+        """Meaning of a sample, ``"mean"`` or ``"point"``; see `vcc.LightField`."""
         return self.attributes.sample
 
     @property
     def disparity(self) -> Disparities:
-        """Maps of its pixels' disparities: kept in the store, or found when first asked for and then kept."""
+        """Disparity maps of the pixels: read from the store, or computed on first access and saved there."""
         return self.grid.disparities
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the light field comes from."""
+        """Origin of the light field."""
         return self.attributes.provenance
 
     @property
     def description(self) -> dict[str, Any] | None:
-        """All that the samples depend on, where stated."""
+        """Everything that the samples depend on; None if not stated."""
         return self.attributes.description
 
     @property
     def lossy(self) -> dict[str, Any] | None:
-        """Codec, quality and measured PSNR of samples that were not kept exactly; else None."""
+        """Codec, quality and measured PSNR of lossy samples; None for lossless ones."""
         return self.attributes.lossy
 
     @property
     def complete(self) -> bool:
-        """Whether the store was finished: all views were written."""
+        """Whether the store was finished, with all views written."""
         return self.attributes.complete
 
     @property
     def view_bytes(self) -> int:
-        """Memory that one view takes once it is read."""
+        """Bytes of one view in memory."""
         return math.prod(self.shape[2:]) * self.read_dtype.itemsize
 
     @property
@@ -170,33 +170,33 @@ class StoredLightField(OnGrid):
         return sum(file.stat().st_size for file in files if file.is_file())
 
     def whole(self) -> None:
-        """Nothing is in memory."""
+        """Return None: no samples are in memory."""
 
     def read(self, block: Block | None = None, progress: Progress | None = None) -> Any:
-        """All of it as a `vcc.LightField` in memory; of a block, the samples alone.
+        """Read everything as a `vcc.LightField` in memory; for a block, return the samples only.
 
         Args:
-            block: which samples; None for all of them.
+            block: the samples to read; None for all.
             progress: called with (done, total) in views.
 
         Raises:
-            InputError: as for a part.
+            InputError: as for reading a part.
         """
         if block is None:
             return self._piece(Ellipsis, progress)
         return self._samples(tuple(range(*ends) for ends in block.ranges), progress)
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> LightField:
-        """A part of the light field, read now, in its place: slices along (v, u, t, s[, channel]).
+        """Read a part of the light field at its position: slices along (v, u, t, s[, channel]).
 
         Raises:
-            InputError: no such part; a view that is missing, damaged or cut off, or that holds what is no
-                radiance, named with its file; more memory needed than there is.
+            InputError: no such part; a view that is missing, damaged, truncated or contains invalid radiance
+                (named, with its file); or not enough memory.
         """
         return self._piece(index)
 
     def view(self, row: int, column: int) -> Image:
-        """One view as a picture; only its file is read. See `vcc.LightField.view`.
+        """Return one view as an image; only its file is read. See `vcc.LightField.view`.
 
         Raises:
             InputError: there is no such view, or it cannot be read.
@@ -205,18 +205,18 @@ class StoredLightField(OnGrid):
         return self[j : j + 1, i : i + 1].view(0, 0)
 
     def scaled(self, factor: float) -> StoredLightField:
-        """The light field of the same scene in a larger world; nothing is read. See `vcc.LightField.scaled`."""
+        """The light field of the scene scaled in size, without reading samples. See `vcc.LightField.scaled`."""
         return replace(self, attributes=replace(self.attributes, frame=self.grid.scaled(factor).frame))
 
     def missing(self) -> list[tuple[int, int]]:
-        """(row, column) of the views that are not there."""
+        """(row, column) of the views that are missing."""
         folder, key = f"{self.path / ARRAY}{os.sep}", self.array.metadata.encode_chunk_key
         rest = (0,) * (len(self.shape) - 2)
-        # Text, as a path for each of many views takes four times as long.
+        # Text: building a path for each of many views takes four times as long.
         return [at for at in np.ndindex(*self.shape[:2]) if not os.path.isfile(folder + key((*at, *rest)))]  # noqa: PTH113
 
     def check_complete(self) -> None:
-        """Refuse a light field of which views are missing, before long work on it.
+        """Raise if views are missing, before a long computation.
 
         Raises:
             InputError: views are missing (named).
@@ -234,23 +234,23 @@ class StoredLightField(OnGrid):
     def linear_view(
         self, row: int, column: int, first: int, stop: int, columns: Range | None = None
     ) -> NDArray[Any]:
-        """Rows of pixels of one view as they are stored, or linear float32 of sRGB codes.
+        """Read rows of pixels of one view, as stored; sRGB codes are converted to linear float32.
 
-        Only the chunks of its file that hold them are read.
+        Only the chunks that contain these pixels are read.
 
         Args:
-            row: of views.
-            column: of views.
-            first: row of pixels.
+            row: row of the view.
+            column: column of the view.
+            first: first row of pixels.
             stop: the row of pixels after the last.
-            columns: the first column of pixels and the one after the last; None for all.
+            columns: first column of pixels and the column after the last; None for all.
 
         Returns:
             Shape (rows, columns[, channels]).
 
         Raises:
-            InputError: the view is missing, its file is damaged or cut off, or it holds what is no radiance; or
-                another store stands there than the one that was opened.
+            InputError: the view is missing, its file is damaged or truncated, or contains invalid radiance; or
+                the store was replaced since it was opened.
         """
         samples = self.stored_view(row, column, first, stop, columns)
         return decode(samples) if self.transfer == "srgb" else samples
@@ -258,12 +258,12 @@ class StoredLightField(OnGrid):
     def stored_view(
         self, row: int, column: int, first: int, stop: int, columns: Range | None = None
     ) -> NDArray[Any]:
-        """As `linear_view`, always as stored."""
+        """Like `linear_view`, but always as stored."""
         with self._through():
             return self._stored(row, column, (first, stop), columns)
 
     def _through(self) -> AbstractContextManager[None]:
-        """What is read within is of the store that was opened."""
+        """Context that raises if the store was replaced since it was opened."""
         return nullcontext() if self.held is None else self.held.through()
 
     def _stored(self, row: int, column: int, rows: Range, columns: Range | None) -> NDArray[Any]:
@@ -295,11 +295,11 @@ class StoredLightField(OnGrid):
     @property
     @cached
     def _chunked(self) -> Chunked | None:
-        """How the files of views are cut into chunks."""
+        """Layout of the view files in chunks."""
         return Chunked.of(self.array)
 
     def _unpacked(self, row: int, column: int, rows: Range, columns: Range) -> NDArray[Any]:
-        """Pixels of a view, by Zarr where nobody else knows how they are packed."""
+        """Pixels of a view; read by Zarr if the layout is not that of this package."""
         file = self.view_file(row, column)
         if self._chunked is not None and self._chunked.kind is not None:
             return self._chunked.read(file, rows, columns)
@@ -308,7 +308,7 @@ class StoredLightField(OnGrid):
         return np.asarray(self.array[row, column, slice(*rows), slice(*columns)])
 
     def _count_words(self, missing: list[tuple[int, int]]) -> str:
-        """What is missing, in words."""
+        """Text for missing views."""
         total = self.shape[0] * self.shape[1]
         if not missing:
             return f"all {total} views are there, but the store was not finished: go on with what makes it"
@@ -323,7 +323,7 @@ class StoredLightField(OnGrid):
         return LightField.of(self._samples(ranges, progress), grid)
 
     def _samples(self, ranges: tuple[range, ...], progress: Progress | None = None) -> NDArray[Any]:
-        """The samples at these indices along each axis, read now."""
+        """Read the samples at these indices along each axis."""
         rows, columns, *pixels = ranges
         down, of_rows = _spanned(pixels[0])
         across, of_columns = _spanned(pixels[1])
@@ -351,7 +351,7 @@ class StoredLightField(OnGrid):
             return kept
         found = disparity_maps(self, progress=progress)
         try:
-            with self._through():  # nothing is kept beside the samples of another one
+            with self._through():  # check first, so that maps are not saved in another store
                 pass
             keep_maps(self.path, found)
         except OSError as error:
@@ -392,20 +392,20 @@ class StoredLightField(OnGrid):
 
 
 def _spanned(along: range) -> tuple[Range, slice]:
-    """The first and the one after the last of some indices, and what takes them from what lies between."""
+    """The first index and the one after the last, and the slice that picks the indices from that range."""
     first, stop = min(along[0], along[-1]), max(along[0], along[-1]) + 1
     return (first, stop), as_slice(range(along.start - first, along.stop - first, along.step))
 
 
 def open_store(path: str | PathLike[str]) -> StoredLightField:
-    """A light field on disk, opened without reading its samples.
+    """Open a light field on disk without reading its samples.
 
     Args:
         path: folder of the store.
 
     Raises:
-        InputError: no such folder, no Zarr v3 group, not one of a light field, a newer version, or attributes or
-            an array that cannot be used (named).
+        InputError: no such folder, not a Zarr v3 group, not a light field, a newer version, or attributes or an
+            array that are invalid (named).
     """
     folder = expanded(path)
     restored(folder)
@@ -418,10 +418,10 @@ def open_store(path: str | PathLike[str]) -> StoredLightField:
 
 
 def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) -> StoredLightField:
-    """A store that another process has open, opened in this one.
+    """Open in this process a store that another process has open.
 
     Raises:
-        InputError: it is not there for this process, or another light field is.
+        InputError: the store is not accessible to this process, or has other content.
     """
     try:
         found = open_store(path)
@@ -438,12 +438,12 @@ def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) ->
 
 
 def _identity(folder: Path) -> Any:
-    """What tells a store from another; a writer that goes on with it changes nothing of that."""
+    """The attributes that identify a store; a continuing writer does not change them."""
     return attributes_of(folder, KEY, ARRAY, ("complete", "lossy"))
 
 
 def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
-    """Refuse an array that holds no light field, or none whose views are read one by one."""
+    """Raise for an array that is not a light field, or whose views cannot be read individually."""
     shape, kind = tuple(array.shape), np.dtype(array.dtype)
     where = folder / ARRAY
     if len(shape) not in (4, 5) or 0 in shape:
@@ -470,10 +470,10 @@ def _check_array(folder: Path, array: Any, attributes: Attributes) -> None:
 
 
 def restored(folder: Path) -> None:
-    """Put a store back that was taken away to be replaced by a writer that died in that moment, and say so.
+    """Restore a store whose writer died while replacing it, and warn.
 
     Raises:
-        InputError: it cannot be put back.
+        InputError: the store cannot be restored.
     """
     try:
         back = put_back(folder)
@@ -491,17 +491,17 @@ def restored(folder: Path) -> None:
 
 
 def is_store(path: str | PathLike[str]) -> bool:
-    """Whether a path is a Zarr group, of version 3 or older: what `open_store` has something to say about."""
+    """Whether a path is a Zarr group of version 3 or older, which `open_store` reads or reports on."""
     folder = expanded(path)
     restored(folder)
     return any((folder / name).is_file() for name in ("zarr.json", ".zgroup", ".zarray"))
 
 
 def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
-    """The Zarr array of samples and the attributes.
+    """Open the Zarr array of samples and read the attributes.
 
     Raises:
-        InputError: as `open_store`.
+        InputError: as in `open_store`.
     """
     check_path(folder, "store")
     if not is_store(folder):
@@ -539,7 +539,7 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
 
 
 def _choice(folder: Path) -> str:
-    """How one frame of a video is taken, in words."""
+    """Text on how to open one frame of a video."""
     frames = places(folder)
     if not frames:
         return "it has no frame yet"

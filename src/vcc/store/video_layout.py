@@ -1,6 +1,6 @@
-"""What a video of light fields states, and how its frames are called; see docs/store.md.
+"""Attributes of a light field video and names of its frames; see docs/store.md.
 
-A frame is a store of its own, and its name says its number and its time: one rename puts both there.
+Each frame is a store, and its name contains its number and time, so a single rename publishes both.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from vcc.store.attributes import DTYPES, Attributes, Transfer, plain
 from vcc.store.held import IDENTITY
 
 VIDEO_VERSION = 1
-"""Of the attributes and the layout below; a reader refuses what is newer than it knows."""
+"""Version of the attributes and the layout below; readers do not support newer versions."""
 VIDEO = "light_field_video"
-"""The attribute of the group under which all others stand."""
+"""The attribute of the group that contains all others."""
 UNFINISHED = ".unfinished"
-"""The folder in which frames are written before they have their names."""
+"""The folder for frames that are being written."""
 
 Between = Literal["linear", "held"]
-"""What there is between two frames: light mixed of them by time, or the first of them until the second."""
+"""Interpolation between two frames: linear in time, or the first frame until the second."""
 
 _NAME = re.compile(r"([0-9]{6,})_(-?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Common(Brief):
-    """What all frames of a video have in common.
+    """Properties that all frames of a video share.
 
     Args:
         shape: (v, u, t, s) or (v, u, t, s, channels).
         kind: the NumPy type of the samples as stored.
         frame: see `vcc.LightField`.
-        transfer: how stored numbers stand for light.
-        sample: what a sample says of the scene.
-        channel_names: one for each channel, or None.
+        transfer: transfer function of the stored samples.
+        sample: meaning of a sample, ``"mean"`` or ``"point"``.
+        channel_names: a name for each channel, or None.
     """
 
     shape: tuple[int, ...]
@@ -57,11 +57,11 @@ class Common(Brief):
 
     @property
     def grid(self) -> Grid:
-        """A frame without its samples, as it is stored."""
+        """A frame without its samples, as stored."""
         return Grid(self.shape, self.frame, self.kind, self.sample)
 
     def difference(self, other: Common) -> str:
-        """What is here instead of what another has, in words; empty for the same."""
+        """Text for the differences from ``other``; empty if there are none."""
         told = {
             "shape": ("×".join(map(str, one.shape)) for one in (self, other)),
             "type": (one.kind.name for one in (self, other)),
@@ -79,7 +79,7 @@ class Common(Brief):
         return "; ".join(words)
 
     def as_json(self) -> dict[str, Any]:
-        """This as it is written."""
+        """The properties as JSON data."""
         return {
             "shape": list(self.shape),
             "dtype": self.kind.name,
@@ -91,10 +91,10 @@ class Common(Brief):
 
     @classmethod
     def from_json(cls, stated: Any, path: Path) -> Common:
-        """What the video at ``path`` states of its frames.
+        """Read the common properties of the frames of the video at ``path``.
 
         Raises:
-            InputError: something missing or impossible (named).
+            InputError: a property is missing or invalid (named).
         """
         if not isinstance(stated, dict):
             raise InputError(f"{path}: grid is an object or null, not {type(stated).__name__}")
@@ -125,10 +125,10 @@ class VideoAttributes(Brief):
     """The attributes of a video.
 
     Args:
-        between: what there is between two frames.
-        common: what all frames have in common; None before the first.
-        provenance: where the video comes from, as JSON can hold it.
-        identity: drawn when the video was made (`vcc.store.held`); None of those that are older.
+        between: interpolation between two frames.
+        common: properties that all frames share; None before the first frame.
+        provenance: origin of the video, as JSON data.
+        identity: a random text drawn when the video is made (`vcc.store.held`); None for older videos.
     """
 
     between: Between = "linear"
@@ -137,7 +137,7 @@ class VideoAttributes(Brief):
     identity: str | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """The attributes as they are written."""
+        """The attributes as JSON data."""
         return {
             "format_version": VIDEO_VERSION,
             IDENTITY: self.identity,
@@ -148,10 +148,10 @@ class VideoAttributes(Brief):
 
     @classmethod
     def read(cls, path: Path) -> VideoAttributes:
-        """The attributes of the video at ``path``.
+        """Read the attributes of the video at ``path``.
 
         Raises:
-            InputError: no video, a newer version, or something missing or impossible (named).
+            InputError: not a video, a newer version, or an attribute that is missing or invalid (named).
         """
         stated = video_attributes(path)
         if stated is None:
@@ -174,10 +174,10 @@ class VideoAttributes(Brief):
 
 
 def video_attributes(folder: Path) -> dict[str, Any] | None:
-    """The attributes of a video as they are written; None where a folder is none.
+    """The attributes of a video as JSON data; None if the folder is not a video.
 
     Raises:
-        InputError: a file that cannot be read, or is not JSON.
+        InputError: the file cannot be read or is not JSON.
     """
     file = folder / "zarr.json"
     if not file.is_file():
@@ -188,12 +188,12 @@ def video_attributes(folder: Path) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a frame stands.
+    """Number, time and folder name of a frame.
 
     Args:
         number: counted from 0.
         time: seconds.
-        name: of its folder; numbers and times of other programs may be written otherwise than here.
+        name: name of the folder; other programs may format number and time differently.
     """
 
     number: int
@@ -202,25 +202,25 @@ class Place:
 
     @classmethod
     def of(cls, number: int, time: float) -> Place:
-        """A frame that is to be written: its time is the shortest text that gives the same number again."""
+        """A new frame; its name contains the shortest decimal that represents the time exactly."""
         return cls(number, time, f"{number:06d}_{time!r}")
 
     @property
     def words(self) -> str:
-        """For messages."""
+        """Text for messages."""
         return f"frame {self.number}, {self.time:g} s"
 
 
 def places(folder: Path) -> list[Place]:
-    """The frames of a video, in their order.
+    """The frames of a video in order.
 
     Raises:
-        InputError: one is missing, two have the same number, or times do not ascend.
+        InputError: a frame is missing, two have the same number, or times do not ascend.
     """
     found = _listed(folder)
     if _first_gap(found) is not None:
-        # A frame that came while names were listed may be passed over where the next one is not. All that this
-        # list is about stood there before the second one is begun.
+        # Listing may miss a frame that appears during the call but include a later one. A second listing contains
+        # every frame up to the last one found, because each frame appears before the next is begun.
         last = found[-1].number
         found = [place for place in _listed(folder) if place.number <= last]
     gap = _first_gap(found)
@@ -231,7 +231,7 @@ def places(folder: Path) -> list[Place]:
 
 def _listed(folder: Path) -> list[Place]:
     found = []
-    for name in os.listdir(folder):  # noqa: PTH208  (of thousands of names, paths are made of few)
+    for name in os.listdir(folder):  # noqa: PTH208  (thousands of names; paths are made for few)
         match = _NAME.fullmatch(name)
         if match:
             found.append(Place(int(match[1]), float(match[2]), name))
@@ -239,7 +239,7 @@ def _listed(folder: Path) -> list[Place]:
 
 
 def _first_gap(found: list[Place]) -> str | None:
-    """Where frames do not follow one another, in words."""
+    """Text for the first fault in the sequence of frames; None if there is none."""
     for number, place in enumerate(found):
         before = found[number - 1] if number else None
         if place.number > number:

@@ -1,4 +1,4 @@
-"""Opening a video of light fields: its times at once, a frame when its turn comes."""
+"""Opening a light field video: times are read at once, frames on access."""
 
 from __future__ import annotations
 
@@ -18,23 +18,22 @@ from vcc.store.video_layout import VIDEO, Between, Common, Place, VideoAttribute
 
 WHAT = "video"
 KEPT = 8
-"""Frames that stay open, those that were asked for last: disparities are then measured once."""
+"""Number of recently used frames that stay open, so that their disparities are measured once."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StoredVideo(Sequence[StoredLightField]):
-    """A video of light fields on disk: the whole frames that there were when it was opened.
+    """A light field video on disk, with the complete frames at the time of opening.
 
-    ``video[3]`` is a frame, a `StoredLightField`, of which nothing is read before it is asked for; ``video[3:9]``
-    is a shorter video. `vcc.MovingCamera.capture` takes it as it is; ``vcc.motion.LightFieldVideo(video,
-    video.times, "held")`` says otherwise than the store what is between frames. Open it again to see the frames
-    that came since.
+    ``video[3]`` is a frame, a `StoredLightField`, whose samples are read on access; ``video[3:9]`` is a shorter
+    video. Pass a video to `vcc.MovingCamera.capture`; ``vcc.motion.LightFieldVideo(video, video.times,
+    "held")`` overrides the interpolation between frames. Open the video again to see frames appended since.
 
     Args:
         path: folder of the video.
-        attributes: what it states; see `vcc.store.video_layout.VideoAttributes`.
-        places: of the frames.
-        held: that the video is still the one that was opened.
+        attributes: attributes of the video; see `vcc.store.video_layout.VideoAttributes`.
+        places: numbers, times and names of the frames.
+        held: checks that the video has not been replaced since it was opened.
     """
 
     path: Path
@@ -46,26 +45,26 @@ class StoredVideo(Sequence[StoredLightField]):
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Of the frames, seconds, ascending."""
+        """Times of the frames in seconds, ascending."""
         return tuple(place.time for place in self.places)
 
     @property
     def between(self) -> Between:
-        """What there is between two frames: ``"linear"`` or ``"held"``, see `vcc.motion.LightFieldVideo`."""
+        """Interpolation between two frames: ``"linear"`` or ``"held"``, see `vcc.motion.LightFieldVideo`."""
         return self.attributes.between
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of a frame, (v, u, t, s) or (v, u, t, s, channels).
+        """Shape of a frame, (v, u, t, s) or (v, u, t, s, channels).
 
         Raises:
-            InputError: there is no frame yet.
+            InputError: there are no frames yet.
         """
         return self._common.shape
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Where the video comes from."""
+        """Origin of the video."""
         return self.attributes.provenance
 
     def __len__(self) -> int:
@@ -78,10 +77,10 @@ class StoredVideo(Sequence[StoredLightField]):
     def __getitem__(self, number: slice) -> StoredVideo: ...
 
     def __getitem__(self, number: int | slice) -> StoredLightField | StoredVideo:
-        """A frame, opened now, or a part of the video.
+        """Open a frame, or return a part of the video.
 
         Raises:
-            InputError: the frame is missing or damaged, or has another grid than the video; it is named.
+            InputError: the frame (named) is missing or damaged, or its grid differs from that of the video.
             IndexError: there is no such frame.
         """
         if isinstance(number, slice):
@@ -94,7 +93,7 @@ class StoredVideo(Sequence[StoredLightField]):
         return frame
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What is open stays here."""
+        """Open frames are not pickled."""
         return _opened_elsewhere, (self.path.absolute(), self.attributes, self.places, self.held.attributes)
 
     def __repr__(self) -> str:
@@ -140,29 +139,29 @@ class StoredVideo(Sequence[StoredLightField]):
 def _opened_elsewhere(
     path: Path, attributes: VideoAttributes, places: tuple[Place, ...], stated: str
 ) -> StoredVideo:
-    """A video that another process has open: no frame is opened here of any other one."""
+    """A video opened by another process; frames are only opened if it is still the same video."""
     return StoredVideo(path, attributes, places, Held(path, WHAT, _identity, stated))
 
 
 def _identity(folder: Path) -> Any:
-    """What tells a video from another; the grid comes with the first frame."""
+    """The attributes that identify a video, without the grid, which is added with the first frame."""
     return attributes_of(folder, VIDEO, but=("grid",))
 
 
 def common_of(frame: StoredLightField) -> Common:
-    """What a frame has in common with the others of its video."""
+    """The properties that a frame shares with the other frames of its video."""
     return Common(frame.shape, frame.dtype, frame.frame, frame.transfer, frame.sample, frame.channel_names)
 
 
 def open_video(path: str | PathLike[str]) -> StoredVideo:
-    """A video of light fields on disk, opened without reading its frames, also while frames are appended.
+    """Open a light field video without reading its frames; frames may be appended meanwhile.
 
     Args:
         path: folder of the video.
 
     Raises:
-        InputError: no such folder, no video, a newer version, attributes that cannot be used, or frames that are
-            missing or do not follow one another (named).
+        InputError: no such folder, not a video, a newer version, invalid attributes, or frames that are missing
+            or out of order (named).
     """
     folder = expanded(path)
     check_path(folder, "video")
@@ -170,7 +169,7 @@ def open_video(path: str | PathLike[str]) -> StoredVideo:
         raise InputError(f"{folder} is no video of light fields: it holds no zarr.json")
     with reading(folder, "a video of light fields"):
         held = Held.now(folder, WHAT, _identity)
-        # Before what they have in common, which is stated before the first one comes.
+        # List frames before reading attributes: the writer states the grid before the first frame appears.
         found = tuple(places(folder))
         attributes = VideoAttributes.read(folder)
         held.check()
@@ -180,6 +179,6 @@ def open_video(path: str | PathLike[str]) -> StoredVideo:
 
 
 def is_video(path: str | PathLike[str]) -> bool:
-    """Whether a folder is a video of light fields."""
+    """Whether a folder is a light field video."""
     folder = expanded(path)
     return is_store(folder) and video_attributes(folder) is not None

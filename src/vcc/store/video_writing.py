@@ -1,4 +1,4 @@
-"""Making a video of light fields: frame after frame, each there as a whole or not at all."""
+"""Writing a light field video frame by frame; each frame appears complete or not at all."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from vcc.store.writing import Framed, StoreWriter, create_store, in_one_piece, w
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Packing(Brief):
-    """How a writer keeps frames; see `create_video`."""
+    """Storage settings of a writer; see `create_video`."""
 
     transfer: Transfer = "linear"
     dtype: np.dtype[Any] | None = None
@@ -51,12 +51,12 @@ class Packing(Brief):
 
 @dataclass
 class VideoWriter:
-    """Appends frames to a video; use it in a ``with`` block or plainly.
+    """Appends frames to a video; use in a ``with`` block or directly.
 
-    A frame is written under a temporary name, settled on the disk and renamed: whatever stops the writer, it is
-    there as a whole or not at all, and those before it stay. Readers may open the video meanwhile. It has one
-    writer at a time: until the ``with`` block is over or the process ends, other processes are refused; a later
-    writer of the same process takes its place. Made by `create_video`.
+    A frame is written under a temporary name, flushed to the disk and renamed, so it is complete or absent
+    however the writer stops, and earlier frames stay. Readers may open the video meanwhile. Only one writer can
+    be active: until the ``with`` block or the process ends, writers in other processes raise `InputError`; a
+    later writer in the same process replaces it. Created by `create_video`.
     """
 
     path: Path
@@ -68,24 +68,24 @@ class VideoWriter:
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Of the frames that are there, seconds: what is to be done next after a stop."""
+        """Times of the existing frames in seconds; after a stop, continue after the last."""
         return tuple(self._times)
 
     def __len__(self) -> int:
         return len(self._times)
 
     def append(self, light_field: Samples, time: float, *, progress: Progress | None = None) -> None:
-        """Write a frame; it is there when this returns.
+        """Write a frame; it is complete when this function returns.
 
         Args:
-            light_field: in memory, or in a store, which is read view by view.
-            time: of the frame, seconds, after all that are there.
+            light_field: a light field in memory, or in a store, which is read view by view.
+            time: time of the frame in seconds, after all existing frames.
             progress: called with (done, total) in views.
 
         Raises:
-            InputError: no light field; a time that does not go on; another grid than the frames before it have,
-                by what differs; what `vcc.store.convert` refuses; this writer has ended; the disk refuses. The
-                frames before it stay.
+            InputError: not a light field; a time that is not after the last; a grid that differs from earlier
+                frames (the difference is named); as in `vcc.store.convert`; this writer has ended; the disk
+                refuses. Earlier frames stay.
         """
         check_is_light_field(light_field)
         kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
@@ -115,9 +115,9 @@ class VideoWriter:
         disparity_range: tuple[float, float] | None = None,
         provenance: Mapping[str, Any] | None = None,
     ) -> Iterator[StoreWriter]:
-        """A frame to write view by view, which need not fit into memory; it is there when the block is over.
+        """Write a frame view by view, for frames larger than memory; it is complete at the end of the block.
 
-        Here, views in any order:
+        Views may be written in any order:
 
             with video.frame(0.04, cameras, (*cameras.shape, 3), "float16") as frame:
                 for row, column in frame.missing():
@@ -125,15 +125,15 @@ class VideoWriter:
 
         Args:
             time: see `append`.
-            cameras_or_frame: see `create_store`, as for all that follows.
-            shape: see there.
-            dtype: see there.
-            sample: see there.
-            disparity_range: see there.
-            provenance: see there.
+            cameras_or_frame: see `create_store`, also for the following arguments.
+            shape: see `create_store`.
+            dtype: see `create_store`.
+            sample: see `create_store`.
+            disparity_range: see `create_store`.
+            provenance: see `create_store`.
 
         Raises:
-            InputError: as `append`; or views are missing when the block is over.
+            InputError: as in `append`, or views are missing at the end of the block.
         """
         frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
         sizes = tuple(int(size) for size in shape)
@@ -149,7 +149,7 @@ class VideoWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Others may write."""
+        """Release the lock."""
         self._lock.give_back()
 
     @contextmanager
@@ -183,7 +183,7 @@ class VideoWriter:
             _removed_if_empty(folder)
 
     def _put(self, part: Path, common: Common, place: Place) -> None:
-        """Give a finished frame its name."""
+        """Rename a finished frame to its final name."""
         self._check_may_write(ending=True)
         try:
             settle(part)
@@ -197,10 +197,10 @@ class VideoWriter:
             raise InputError(f"{part} could not be settled: {error.strerror or error}") from error
 
     def _following(self, time: float) -> float:
-        """A time after all that are there.
+        """Check that a time is after all existing frames.
 
         Raises:
-            InputError: another.
+            InputError: the time is not after the last, or not finite.
         """
         checked = checks.finite("the time of a frame", time, "seconds") + 0.0  # -0 is 0
         if self._times and not self._times[-1] < checked:
@@ -211,10 +211,10 @@ class VideoWriter:
         return checked
 
     def _check_fits(self, common: Common, place: Place) -> None:
-        """Refuse another grid than that of the frames that are there.
+        """Raise if a grid differs from that of the existing frames.
 
         Raises:
-            InputError: what differs.
+            InputError: the grid differs; the message names the difference.
         """
         difference = "" if self.attributes.common is None else common.difference(self.attributes.common)
         if difference:
@@ -246,34 +246,34 @@ def create_video(
     chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> VideoWriter:
-    """A video to append frames to: a new one, or one that is there and goes on.
+    """Create a video, or continue an existing one; returns a writer that appends frames.
 
-    So that work goes on where it stopped:
+    To continue after an interruption:
 
         with vcc.store.create_video("scene.zarr") as video:
             for n in range(len(video), 240):
                 video.append(rendered(n / 24), n / 24)
 
-    All frames have the grid of the first one: shape, type, frame, transfer, names of channels.
+    All frames have the grid of the first one: shape, type, frame, transfer, channel names.
 
     Args:
-        path: folder of the video; made, or there and empty, or there and a video.
-        between: what there is between two frames, ``"linear"`` or ``"held"``, see `vcc.motion.LightFieldVideo`;
-            None is what the video states, and ``"linear"`` of a new one.
-        transfer: of light fields in memory: ``"srgb"`` if their integers are sRGB codes. Those on disk say it
-            themselves.
-        dtype: of the stored samples, see `vcc.store.convert`; None keeps them bit for bit.
-        channel_names: one for each channel.
-        provenance: where a new video comes from, as JSON can hold it.
+        path: folder of the video; created if missing or empty, else it must be a video.
+        between: interpolation between frames, ``"linear"`` or ``"held"``, see `vcc.motion.LightFieldVideo`;
+            None keeps that of an existing video and is ``"linear"`` for a new one.
+        transfer: for light fields in memory: ``"srgb"`` if their integers are sRGB codes. Light fields on disk
+            state their own.
+        dtype: type of the stored samples, see `vcc.store.convert`; None keeps the samples bit for bit.
+        channel_names: a name for each channel.
+        provenance: origin of a new video, as JSON data.
         chunks: see `vcc.store.create_store`.
-        compression: of the frames that this writer appends, see there.
+        compression: compression of the frames that this writer appends, see `vcc.store.create_store`.
 
     Warns:
-        ResultWarning: a writer before this one was stopped in a frame, of which nothing is kept.
+        ResultWarning: an earlier writer was stopped during a frame, which is lost.
 
     Raises:
-        InputError: a path that is something else; another word; a video that states otherwise what is between
-            frames, or that is damaged; another process writes it (named); the disk refuses.
+        InputError: the path is something else; an invalid argument; a video with another ``between``, or a
+            damaged one; another process writes it (named); the disk refuses.
     """
     folder = expanded(path)
     if between is not None:
@@ -312,7 +312,7 @@ def create_video(
 
 
 def _begin(folder: Path, attributes: VideoAttributes) -> None:
-    """Make the group under a temporary name and rename it."""
+    """Create the group under a temporary name and rename it."""
     if not folder.parent.is_dir():
         raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     part = part_of(folder)
@@ -328,7 +328,7 @@ def _begin(folder: Path, attributes: VideoAttributes) -> None:
 
 
 def _removed_if_empty(folder: Path) -> None:
-    with suppress(OSError):  # it is not there, or a frame is in it
+    with suppress(OSError):  # the folder does not exist or contains a frame
         folder.rmdir()
 
 

@@ -1,4 +1,4 @@
-"""Making a store: view by view, each there as a whole or not at all, so that work can go on where it stopped."""
+"""Writing a store view by view; each view appears complete or not at all, so work can resume after a stop."""
 
 from __future__ import annotations
 
@@ -50,21 +50,22 @@ from vcc.store.reading import StoredLightField, is_store, open_store, read_metad
 
 
 class Framed(Protocol):
-    """What says where views are, such as `vcc.sources.CameraArray`."""
+    """An object that states the positions of views, such as `vcc.sources.CameraArray`."""
 
     @property
     def frame(self) -> Affine:
-        """From indices to rays."""
+        """The affine map from indices to rays."""
         ...
 
 
 @dataclass
 class StoreWriter:
-    """Writes the views of a store, in any order; use it in a ``with`` block or plainly.
+    """Writes the views of a store in any order; use in a ``with`` block or directly.
 
-    A view is written under a temporary name and renamed, so that after a kill a view is there as a whole or not at
-    all. A store has one writer at a time: until it is finished, the ``with`` block is over or the process ends,
-    other processes are refused; a later writer of the same process takes its place. Made by `create_store`.
+    A view is written under a temporary name and renamed, so after a kill it is complete or absent. Only one
+    writer can be active: until the store is finished, or the ``with`` block or the process ends, writers in
+    other processes raise `InputError`; a later writer in the same process replaces it. Created by
+    `create_store`.
     """
 
     path: Path
@@ -81,30 +82,31 @@ class StoreWriter:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the samples as stored."""
+        """Type of the samples as stored."""
         kind: np.dtype[Any] = np.dtype(self.array.dtype)
         return kind
 
     def has_view(self, row: int, column: int) -> bool:
-        """Whether a view is there."""
+        """Whether a view exists."""
         return self._reader.view_file(row, column).is_file()
 
     def missing(self) -> list[tuple[int, int]]:
-        """(row, column) of the views that are not there yet, row by row."""
+        """(row, column) of the views that are still missing, row by row."""
         return self._reader.missing()
 
     def write_view(self, row: int, column: int, samples: NDArray[Any]) -> None:
-        """Write one view; it is there when this returns.
+        """Write one view; it is complete when this function returns.
 
         Args:
-            row: of views, 0 at the top.
-            column: of views, 0 at the left.
-            samples: shape (rows, columns[, channels]), of the store's type. Floating-point samples are brought to
-                a floating-point store's precision.
+            row: row of the view, 0 at the top.
+            column: column of the view, 0 at the left.
+            samples: shape (rows, columns[, channels]), of the store's type. Floating-point samples are rounded
+                to the precision of a floating-point store.
 
         Raises:
-            InputError: the store is finished; there is no such view; another shape or type; samples that are NaN,
-                infinite, negative or too large; the disk refuses (full, no permission). Views written before stay.
+            InputError: the store is finished; no such view; another shape or type; samples that are NaN,
+                infinite, negative or too large; the disk refuses (full, no permission). Views written before
+                stay.
         """
         nv, nu = self.shape[:2]
         if not (0 <= row < nv and 0 <= column < nu):
@@ -131,7 +133,7 @@ class StoreWriter:
             self._errors[row, column] = float(np.mean(difference * difference))
 
     def finish(self) -> StoredLightField:
-        """Say that all views are there, and open the store.
+        """Mark the store as complete and open it.
 
         Raises:
             InputError: views are missing (named), or the disk refuses.
@@ -156,7 +158,7 @@ class StoreWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Others may write. Nothing is finished: an unfinished store is one to go on with."""
+        """Release the lock. The store is not finished: an unfinished store can be continued."""
         self._lock.give_back()
 
     @property
@@ -164,7 +166,7 @@ class StoreWriter:
         return StoredLightField(self.path, self.attributes, self.array)
 
     def _fitting(self, samples: NDArray[Any], what: str) -> NDArray[Any]:
-        """Samples of the store's shape and type."""
+        """Check shape and range of samples and convert them to the store's type."""
         if samples.shape != self.shape[2:]:
             raise InputError(f"{what} has the shape {samples.shape}, and the store's views have {self.shape[2:]}")
         if samples.dtype != self.dtype and not (samples.dtype.kind == "f" and self.dtype.kind == "f"):
@@ -182,7 +184,7 @@ class StoreWriter:
         return samples.astype(self.dtype, copy=False)
 
     def _measured_loss(self) -> dict[str, Any] | None:
-        """What lossy compression did to the views that this writer wrote: PSNR in dB, peak the full scale."""
+        """Loss in the views that this writer wrote: PSNR in dB relative to full scale; None if lossless."""
         if not isinstance(self.compression, Lossy):
             return None
         stated: dict[str, Any] = {"codec": self.compression.codec, "quality": self.compression.quality}
@@ -216,29 +218,29 @@ def create_store(
     chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> StoreWriter:
-    """A store to write views to: a new one, or one of the same description that is gone on with.
+    """Create a store, or continue one of the same description; returns a writer of views.
 
     Args:
-        path: folder of the store; made, or there and empty, or there and a store of the same description.
-        cameras_or_frame: where the views are: a `vcc.sources.CameraArray`, or a frame (see `vcc.LightField`).
+        path: folder of the store; created if missing or empty, else it must be a store of the same description.
+        cameras_or_frame: positions of the views: a `vcc.sources.CameraArray`, or a frame (see `vcc.LightField`).
         shape: (v, u, t, s) or (v, u, t, s, channels).
-        dtype: ``"uint8"``, ``"uint16"``, ``"float16"`` or ``"float32"``, as samples are stored.
-        provenance: where the light field comes from, as JSON can hold it.
-        description: all that the samples depend on, as JSON can hold it. Without one a store is not gone on with.
+        dtype: type of the stored samples: ``"uint8"``, ``"uint16"``, ``"float16"`` or ``"float32"``.
+        provenance: origin of the light field, as JSON data.
+        description: everything that the samples depend on, as JSON data. A store without one cannot be continued.
         transfer: ``"linear"``, or ``"srgb"`` for integers that are sRGB codes (read as linear float32).
-        channel_names: one for each channel.
-        disparity_range: (lowest, highest), pixels per view along u, where known.
+        channel_names: a name for each channel.
+        disparity_range: (lowest, highest), pixels per view along u, if known.
         sample: ``"mean"`` over a pixel or ``"point"``, see `vcc.LightField`.
-        chunks: rows of pixels that are packed together, or (rows, columns) of them: cameras and parts that need
-            few pixels of each view read the chunks that hold them. None takes rows of about 128 KiB.
+        chunks: rows of pixels per chunk, or (rows, columns): cameras and parts that need few pixels of each
+            view read only the chunks that contain them. None uses rows of about 128 KiB.
         compression: `Lossless` or `Lossy`; None is ``Lossless()``.
 
     Returns:
-        The writer. Where all views are there and the store is finished, it has none missing.
+        The writer. For a finished store, it reports no missing views.
 
     Raises:
-        InputError: a shape, type or attribute that no light field has; a path that is something else; a store of
-            another description (what differs is named); another process writes it (named); the disk refuses.
+        InputError: an invalid shape, type or attribute; a path that is something else; a store of another
+            description (the difference is named); another process writes the store (named); the disk refuses.
     """
     folder = Path(path).expanduser()
     frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
@@ -268,7 +270,7 @@ def create_store(
         identity=drawn(),
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
-    attributes.as_json()  # refuses what JSON cannot hold, before anything is made
+    attributes.as_json()  # raises for data that JSON cannot represent, before anything is created
     check_name(folder)
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
@@ -279,7 +281,7 @@ def create_store(
         clear_leftovers(folder, lock.patience)
         if not there:
             _make(folder, attributes, shape, kind, packing, chunks)
-        for left in (folder / ARRAY).rglob("*.partial"):  # of a run that was killed
+        for left in (folder / ARRAY).rglob("*.partial"):  # left by a killed writer
             left.unlink(missing_ok=True)
         array, _ = read_metadata(folder, "r+")
         return StoreWriter(folder, attributes, _writable(array), packing, lock)
@@ -300,22 +302,22 @@ def save_store(
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> StoredLightField:
-    """Write a light field to a store. It appears whole or not at all.
+    """Write a light field to a store, atomically.
 
     Args:
-        light_field: of uint8, uint16, float16 or float32 samples; one that is not in memory is read view by view.
+        light_field: uint8, uint16, float16 or float32 samples; a light field on disk is read view by view.
         path: folder of the store.
-        provenance: where the light field comes from, as JSON can hold it.
-        transfer: ``"srgb"`` if integer samples are not linear but sRGB codes.
-        channel_names: see `create_store`, likewise the next two.
-        chunks: see there.
-        compression: see there.
-        overwrite: replace a store of that name; it stays until the new one is whole.
+        provenance: origin of the light field, as JSON data.
+        transfer: ``"srgb"`` if integer samples are sRGB codes instead of linear.
+        channel_names: see `create_store`.
+        chunks: see `create_store`.
+        compression: see `create_store`.
+        overwrite: replace an existing store; the old store stays until the new one is complete.
         progress: called with (done, total) in views.
 
     Raises:
-        InputError: the path exists (and is no store, or is not to be replaced), or what `create_store` and
-            `StoreWriter.write_view` refuse.
+        InputError: the path exists and is not a store or ``overwrite`` is False; or as in `create_store` and
+            `StoreWriter.write_view`.
     """
     check_is_light_field(light_field)
     grid = light_field.grid
@@ -348,15 +350,15 @@ def write_views(
 
     Args:
         path: folder of the store.
-        grid: what the samples stand for, and of which type they are written.
-        view: gives the samples of view (row, column).
+        grid: the geometry, and the type of the stored samples.
+        view: function that returns the samples of view (row, column).
         overwrite: see `save_store`.
-        progress: see there.
-        disparity: maps to be kept beside the samples, where known.
+        progress: see `save_store`.
+        disparity: disparity maps to store, if known.
         stated: further arguments of `create_store`.
 
     Raises:
-        InputError: see `save_store`.
+        InputError: as in `save_store`.
     """
     folder = Path(path).expanduser()
     check_name(folder)
@@ -381,16 +383,16 @@ def write_views(
 def in_one_piece(
     folder: Path, part: Path, begin: Callable[[], StoreWriter], put: Callable[[], None]
 ) -> Iterator[StoreWriter]:
-    """A store that appears at the end of the block, or not at all.
+    """Context for writing a store that appears at the end of the block, or not at all.
 
     Args:
-        folder: of the store.
-        part: where it is written.
-        begin: makes the store there.
-        put: gives it its name when it is finished.
+        folder: folder of the store.
+        part: temporary folder of the store.
+        begin: creates the store in the temporary folder.
+        put: renames the finished store.
 
     Raises:
-        InputError: as raised within, of the store by its own name; the disk refuses; views are missing.
+        InputError: as raised within, with the final name of the store; the disk refuses; views are missing.
     """
     try:
         with begin() as writer:
@@ -415,7 +417,7 @@ def write_all(
     progress: Progress | None,
     disparity: DisparityMaps | None,
 ) -> None:
-    """Write all views of a store, and maps of disparities beside them where they are known; see `write_views`."""
+    """Write all views of a store, and disparity maps if known; see `write_views`."""
     total = writer.shape[0] * writer.shape[1]
     for done, (j, i) in enumerate(np.ndindex(*writer.shape[:2]), start=1):
         writer.write_view(j, i, view(j, i))
@@ -450,7 +452,7 @@ def _make(
     packing: Compression,
     chunks: Pixels | None,
 ) -> None:
-    """Make the group and its array under a temporary name and rename it: a store is there or it is not."""
+    """Create the group and its array under a temporary name and rename the folder."""
     import zarr
 
     if not folder.parent.is_dir():
@@ -480,12 +482,12 @@ def _make(
 
 
 def _writable(array: Any) -> Any:
-    """The array, writing chunks that are all dark like others: what is not there is missing."""
+    """Configure the array to write all-zero chunks too: an absent chunk means a missing view."""
     return array.with_config({"write_empty_chunks": True})
 
 
 def _continued(folder: Path, wanted: Attributes) -> Attributes:
-    """What a store states that is there already and is gone on with."""
+    """The attributes of an existing store that is to be continued."""
     if not folder.is_dir() or not is_store(folder):
         raise InputError(f"{folder} is there already, and is no store: choose another name")
     _, found = read_metadata(folder, "r+")
@@ -494,7 +496,7 @@ def _continued(folder: Path, wanted: Attributes) -> Attributes:
             f"{folder} is there already{'' if found.complete else ', not finished'}, and without a description of "
             "what its views depend on it is not gone on with: remove it, or choose another name"
         )
-    found.description.get(SETTINGS, {}).setdefault("sample", "mean")  # of stores older than this setting
+    found.description.get(SETTINGS, {}).setdefault("sample", "mean")  # for stores older than this setting
     if not same(wanted.description, found.description):
         raise InputError(
             f"{folder} was made from another description, and views of two are never mixed. "
@@ -526,7 +528,7 @@ def _check_replaceable(folder: Path, overwrite: bool) -> None:
 
 
 def _put_in_place(part: Path, folder: Path, overwrite: bool) -> None:
-    """Give a finished store its name; what was there goes once the new one stands."""
+    """Rename a finished store to its final name; existing content is then removed."""
     try:
         put_in_place(part, folder, overwrite)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Arrays of Zarr that others wrote: chunks are looked at before they are read."""
+"""Reading Zarr arrays of unknown origin: the size of each chunk file is checked first."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from vcc.base.errors import InputError
 from vcc.base.reading import MOST_UNPACKED, check_file, reading
 
 HEADS = 2**12
-"""Bytes by which a chunk that cannot be packed may exceed its samples, beside one in 128: heads and checksums."""
+"""Overhead in bytes of an incompressible chunk (headers, checksums), in addition to 1/128 of its samples."""
 
 
 def chunk_file(folder: Path, array: Any, place: tuple[int, ...]) -> Path:
-    """The file of a chunk, given by its place along the first axes; along the others there is one chunk."""
+    """The file of a chunk, given by its index along the first axes; the other axes have one chunk."""
     rest = (0,) * (len(array.shape) - len(place))
     return folder / str(array.metadata.encode_chunk_key((*place, *rest)))
 
 
 def read_array(folder: Path, array: Any, index: Any, places: Sequence[tuple[int, ...]], what: str) -> NDArray[Any]:
-    """A part of a Zarr array, whose chunks are looked at before they are read.
+    """Read a part of a Zarr array after checking its chunk files.
 
     Args:
-        folder: of the array.
-        array: the Zarr array, with one chunk along all axes but the first ones.
-        index: the part.
-        places: of its chunks, along the first axes.
-        what: it is, for messages.
+        folder: folder of the array.
+        array: the Zarr array, with a single chunk along all axes except the first ones.
+        index: index of the part.
+        places: indices of its chunks along the first axes.
+        what: noun for messages.
 
     Raises:
-        InputError: a chunk that is no regular file, larger than it can be, or damaged.
+        InputError: a chunk is not a regular file, is too large, or is damaged.
     """
     with reading(folder, what):
         kind = np.dtype(array.dtype)
@@ -49,10 +49,10 @@ def read_array(folder: Path, array: Any, index: Any, places: Sequence[tuple[int,
 
 
 def check_size(file: Path, most: int) -> None:
-    """Refuse a file of more bytes than can be right.
+    """Raise if a file exceeds the maximum size.
 
     Raises:
-        InputError: it has more.
+        InputError: the file is larger.
     """
     size = file.stat().st_size
     if size > most:

@@ -1,4 +1,4 @@
-"""Sweeps: many cameras before one light field, their pictures along labelled axes, and a table of them.
+"""Sweeps: images of many cameras of one light field, along labelled axes, and a table of them.
 
 ::
 

@@ -1,4 +1,4 @@
-"""Which cameras a sweep goes through: all combinations, a list, or drawn at random or by Sobol's points."""
+"""The cameras of a sweep: all combinations of values, a list, or drawn at random or from a Sobol' sequence."""
 
 from __future__ import annotations
 
@@ -23,31 +23,32 @@ from vcc.sweeps.values import Varied, range_of, taking, varied
 
 Kind = Literal["grid", "list", "random", "sobol"]
 CAMERA = "camera"
-"""The axis along which cameras stand that are given one by one, or differ in several parameters at once."""
+"""The axis of cameras that are given one by one, or that differ in several parameters at once."""
 MOST_CAMERAS = 10**6
 DRAWN = 64
-"""Cameras that are drawn where nobody says how many: a power of two, as Sobol's points like it."""
+"""Default number of cameras to draw: a power of two, which suits Sobol' points."""
 KEPT = 4096
-"""Up to so many cameras are kept once they are made."""
+"""Sweeps of up to this many cameras keep the cameras in memory."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Design(Brief):
-    """Parameters and their values, and how they go together. `grid`, `listed`, `random` and `sobol` make it.
+    """Parameters with their values, and how the values are combined; see `grid`, `listed`, `random` and `sobol`.
 
     Args:
-        parameters: names (``"sensor.z"``, ``"code.pattern"``) and values: a list or an array as the camera takes
-            them (SI units), or words as a camera file has them: ``"50mm:54mm:40"``, ``"mura, circle"``. For
+        parameters: names (``"sensor.z"``, ``"code.pattern"``) and values: a list or an array as the camera
+            accepts them (SI units), or text as in a camera file: ``"50mm:54mm:40"``, ``"mura, circle"``. For
             ``"random"`` and ``"sobol"`` also an interval, ``(50 * mm, 54 * mm)`` or ``"50mm:54mm"``.
-        kind: ``"grid"``: every combination, an axis for each parameter; ``"list"``: the first values of all,
-            then the second; ``"random"``: each drawn for itself, evenly; ``"sobol"``: scrambled points of Sobol',
-            which fill the space of all parameters more evenly.
-        count: of cameras that are drawn; None takes 64.
+        kind: ``"grid"``: every combination, one axis per parameter; ``"list"``: the first values of all, then
+            the second; ``"random"``: independent, uniform draws; ``"sobol"``: scrambled Sobol' points, which
+            fill the parameter space more evenly.
+        count: number of cameras to draw; None for 64.
         seed: of the draw. The same seed gives the same cameras.
-        folder: where files are found that words name, as those of a mask; the current one unless told.
+        folder: of the files that text may name, such as those of a mask; default: the current folder.
 
     Raises:
-        InputError: another kind; a count or a seed where nothing is drawn; no whole numbers of 1 or more.
+        InputError: unknown kind; a count or a seed if nothing is drawn; a count that is not a whole number of
+            1 or more.
     """
 
     parameters: Mapping[str, Any]
@@ -79,14 +80,14 @@ class Design(Brief):
         return self.kind in ("random", "sobol")
 
     def of(self, camera: Camera) -> tuple[Varied, ...]:
-        """The parameters and the values that they take; of equally many each, unless it is a grid.
+        """The parameters and their values; except in a grid, all have the same number of values.
 
         Args:
-            camera: whose parameters they are.
+            camera: the camera that has the parameters.
 
         Raises:
-            InputError: a parameter that there is not (those that there are are listed), values that are none,
-                lists of different lengths.
+            InputError: unknown parameter (the message lists the available ones), invalid values, or lists of
+                different lengths.
         """
         if self.drawn:
             points = self._points(len(self.parameters))
@@ -110,7 +111,7 @@ class Design(Brief):
         return np.asarray(points.random_base2(math.ceil(math.log2(count))))[:count]
 
     def _drawn(self, camera: Camera, name: str, given: Any, shares: NDArray[np.float64]) -> Varied:
-        """A parameter's values of numbers from 0 to 1: within an interval, or one of a list."""
+        """Values of a parameter from numbers between 0 and 1: within an interval, or out of a list."""
         ends = range_of(camera, name, given)
         if ends is None:
             choices = varied(camera, name, given, Beside(self.folder))
@@ -123,7 +124,7 @@ class Design(Brief):
 
 
 def grid(parameters: Mapping[str, Any]) -> Design:
-    """Every combination of values: an axis for each parameter; see `Design`."""
+    """Every combination of values, one axis per parameter; see `Design`."""
     return Design(parameters)
 
 
@@ -133,23 +134,23 @@ def listed(parameters: Mapping[str, Any]) -> Design:
 
 
 def random(parameters: Mapping[str, Any], count: int = DRAWN, seed: int = 0) -> Design:
-    """Cameras whose parameters are drawn, each for itself; see `Design`."""
+    """Cameras with independently drawn parameters; see `Design`."""
     return Design(parameters, "random", count, seed)
 
 
 def sobol(parameters: Mapping[str, Any], count: int = DRAWN, seed: int = 0) -> Design:
-    """Cameras whose parameters are scrambled points of Sobol' (best a power of two of them); see `Design`."""
+    """Cameras at scrambled Sobol' points, best a power of two of them; see `Design`."""
     return Design(parameters, "sobol", count, seed)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Cameras(Brief, Sequence[Camera]):
-    """The cameras of a sweep, numbered through; of several axes the last one goes fastest.
+    """The cameras of a sweep, numbered; with several axes the last one varies fastest.
 
     Args:
         base: the camera whose parameters change; of several cameras, the first.
-        varied: what changes; `CAMERA` for cameras that are given one by one.
-        together: whether all changes at once, along one axis.
+        varied: the parameters and values; `CAMERA` for cameras that are given one by one.
+        together: whether all parameters change along one axis.
     """
 
     base: Camera
@@ -163,20 +164,20 @@ class Cameras(Brief, Sequence[Camera]):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many there are along each axis."""
+        """The number of cameras along each axis."""
         return (len(self.varied[0]),) if self.together else tuple(len(each) for each in self.varied)
 
     def __len__(self) -> int:
         return math.prod(self.shape)
 
     def places(self, number: int) -> tuple[int, ...]:
-        """Which value of each parameter a camera has."""
+        """The index of a camera's value for each parameter."""
         if self.together:
             return (number,) * len(self.varied)
         return tuple(int(n) for n in np.unravel_index(number, self.shape))
 
     def said(self, number: int) -> str:
-        """The values of a camera in words: ``"sensor.z 50 mm, code.pattern mura"``."""
+        """The values of a camera as text: ``"sensor.z 50 mm, code.pattern mura"``."""
         pairs = zip(self.varied, self.places(number), strict=True)
         return ", ".join(f"{each.name} {each.labels[place]}" for each, place in pairs) or "as given"
 
@@ -192,17 +193,17 @@ class Cameras(Brief, Sequence[Camera]):
         return (self[number] for number in range(len(self)))
 
     def check(self) -> None:
-        """Make all of them once, before long work.
+        """Create all cameras once, before long work.
 
         Raises:
-            InputError: what a camera refuses, with its values.
+            InputError: a camera rejects its values, which the message contains.
         """
         _ = self.sensors
 
     @property
     @cached
     def sensors(self) -> tuple[Sensor, ...]:
-        """The sensors of all cameras; those that stay as they are are one thing."""
+        """The sensors of all cameras; unchanged sensors are the same object."""
         found = []
         for number in range(len(self)):
             with checks.within(self.said(number)):
@@ -210,7 +211,7 @@ class Cameras(Brief, Sequence[Camera]):
         return tuple(found)
 
     def frames(self) -> NDArray[np.float64]:
-        """From (column, row, 1) to (x, y, 1) on the sensors: (3, 3), or (…, 3, 3) where they differ."""
+        """Maps from (column, row, 1) to (x, y, 1) on the sensors: (3, 3), or (…, 3, 3) if they differ."""
         different = {id(sensor): sensor.frame.matrix for sensor in self.sensors}
         first = different[id(self.sensors[0])]
         if all(np.array_equal(frame, first) for frame in different.values()):
@@ -218,7 +219,7 @@ class Cameras(Brief, Sequence[Camera]):
         return np.stack([different[id(sensor)] for sensor in self.sensors]).reshape(*self.shape, 3, 3)
 
     def alike(self) -> list[int]:
-        """The numbers of all cameras, those next to each other that differ only in what patterns let through."""
+        """The numbers of all cameras, sorted so that cameras which differ only in patterns are neighbours."""
         kept = [n for n, each in enumerate(self.varied) if not each.name.endswith(".pattern")]
 
         def others(number: int) -> tuple[int, ...]:
@@ -245,7 +246,7 @@ class Cameras(Brief, Sequence[Camera]):
         return with_values(base, found) if found else base
 
     def _found(self, base: Camera, name: str, value: Any) -> Parameter:
-        """Where a value is put; an array of cells may have another place than a pattern."""
+        """The parameter that receives a value; an array of cells may belong to another field than a pattern."""
         key = id(base), name, type(value)
         if key not in self._parameters:
             self._parameters[key] = place(base, name, value)
@@ -258,15 +259,15 @@ class Cameras(Brief, Sequence[Camera]):
 
 
 def cameras_of(cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any] | Design | None) -> Cameras:
-    """The cameras that a sweep goes through.
+    """The cameras of a sweep.
 
     Args:
         cameras: one, or several.
-        parameters: what changes; of several cameras in each of them. None: nothing.
+        parameters: the values that vary, applied to each of several cameras. None: nothing.
 
     Raises:
-        InputError: what is no camera, none at all, several of them and a design that is no grid, too many; and
-            what `Design.of` and the cameras themselves refuse.
+        InputError: not a camera, no camera, several cameras with a design other than a grid, too many
+            cameras; see also `Design.of`, and the checks of the cameras.
     """
     design = parameters if isinstance(parameters, Design) else Design({} if parameters is None else parameters)
     several = [cameras] if isinstance(cameras, Camera) else list(cameras)

@@ -1,4 +1,4 @@
-"""What a sweep is: all that its results depend on, so that results of two are never mixed."""
+"""The identity of a sweep: everything that its results depend on, so that results of two are never mixed."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from vcc.store import StoredLightField
 from vcc.sweeps.design import Cameras
 
 RESULTS_DIFFER = ("tolerance", "engine")
-"""What is chosen for a run and changes its results."""
+"""Options of a run that change the results."""
 
 
 def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any] | None:
-    """All that pictures depend on, as JSON holds it; None where that is, in part, a function of Python.
+    """Everything that the images depend on, as JSON; None if a part is a Python function.
 
     Args:
         cameras: of the sweep.
-        light_field: of which they make pictures.
-        how: they do.
+        light_field: before the cameras.
+        how: how the images are made.
     """
     try:
         parameters = {
@@ -51,7 +51,7 @@ def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any]
 
 
 def _of_light_field(light_field: Samples) -> str:
-    """The content of a light field in a word: all samples, or what a store states and the sizes of its files."""
+    """A fingerprint of a light field: of all samples, or of a store's metadata and the sizes of its files."""
     grid = light_field.grid
     told = hashlib.sha256(repr((grid.shape, grid.kind.name, grid.sample)).encode())
     told.update(np.round(grid.frame.matrix, 15).tobytes())

@@ -1,6 +1,6 @@
-"""Sweeps on disk: a Zarr group that xarray opens, written picture by picture, and gone on with after a stop.
+"""Sweeps on disk: a Zarr group that xarray opens, written image by image, and resumed after an interruption.
 
-A picture is there as a whole or not at all; that it is done, and what is told of it, is noted after it.
+An image is on disk completely or not at all. Its entry in ``done`` and its numbers are written after it.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from vcc.sweeps.stored import StoredPictures, member, small
 from vcc.sweeps.values import Varied
 
 KEY = "sweep"
-"""The attribute of the group under which all others stand."""
+"""The attribute of the group that contains all others."""
 FORMAT_VERSION = 1
 PICTURES, DONE, FRAME = "pictures", "done", "sensor_frame"
 PLACES = ("y", "x")
-"""Of rows and of columns on the sensor, metres."""
+"""Coordinates of rows and columns on the sensor, metres."""
 NOTED_EVERY = 2.0
-"""Seconds after which it is noted what is done: so much work a kill can undo, at most, beside what is at work."""
+"""Seconds between updates of ``done``: the most work, besides images in progress, that a kill can undo."""
 IN_WORDS = {
     "mean": "mean irradiance",
     "missing_rays": "share of the rays asked for that the light field lacks",
@@ -46,23 +46,23 @@ IN_WORDS = {
     DONE: "whether the picture is there",
     FRAME: "from (column, row, 1) to (x, y, 1) on the sensor, metres",
 }
-"""What arrays hold, for xarray."""
+"""Descriptions of the arrays, for xarray."""
 
 
 class InStore(Results):
-    """Results of a sweep that go to a store. One writer at a time: another process is told who is at it.
+    """Results of a sweep in a store. A second writer gets an error that names the process that holds the lock.
 
     Args:
-        path: folder of the store; made, or there and of the same sweep, which is gone on with.
+        path: folder of the store; created, or an existing store of the same sweep, which is resumed.
         swept: the sweep, nothing of which is done.
-        picture: the shape of all pictures; None where none are kept.
-        description: all that pictures depend on (`vcc.sweeps.identity`).
-        metrics: those that are asked for, in a word each (`vcc.sweeps.metrics.metrics_in_words`). Others that
-            are there stay; what one of the same name told that was another is forgotten.
+        picture: the shape of all images; None if none are kept.
+        description: everything that the images depend on (`vcc.sweeps.identity`).
+        metrics: the requested metrics with their fingerprints (`vcc.sweeps.metrics.metrics_in_words`). Other
+            metrics in the store are kept; the values of a different metric of the same name are discarded.
 
     Raises:
-        InputError: the path is something else, or another sweep (what differs is named); new metrics of pictures
-            that were not kept; another process writes it; the disk refuses.
+        InputError: the path is something else, or another sweep (the message names the difference); new
+            metrics of images that were not kept; another process writes the store; the disk reports an error.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class InStore(Results):
             clear_leftovers(self.path, self._lock.patience)
             if not there:
                 _make(self.path, swept, picture, stated, metrics)
-            for left in self.path.rglob("*.partial"):  # of a run that was killed
+            for left in self.path.rglob("*.partial"):  # left by a killed run
                 left.unlink(missing_ok=True)
             self._group = _opened(self.path, "r+")
             self._pictures: Any = None if picture is None else self._group[PICTURES]
@@ -100,7 +100,7 @@ class InStore(Results):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """What is done is noted, whatever ended the work, and said; then others may write."""
+        """Record what is done, however the work ended, add it to the error message, and release the lock."""
         try:
             self._note()
         except InputError:
@@ -115,7 +115,7 @@ class InStore(Results):
 
     @property
     def kept(self) -> str:
-        """How much is there, in words."""
+        """How many images the store has, as text."""
         done = self.swept.done
         return f"{done.sum()} of {done.size} pictures are kept in {self.path}: the same sweep goes on from there"
 
@@ -123,13 +123,13 @@ class InStore(Results):
         """See `Results`.
 
         Raises:
-            InputError: the disk refuses; all that was done before is kept.
+            InputError: the disk reports an error; all earlier results are kept.
         """
         with self._disk(f"the picture of {self.swept.labels(place)}"):
             self._pictures[place] = values
 
     def commit(self) -> None:
-        """Note what is done, unless that was a moment ago."""
+        """Record what is done, unless that happened a moment ago."""
         if time.monotonic() - self._noted > NOTED_EVERY:
             self._note()
 
@@ -141,7 +141,7 @@ class InStore(Results):
         return replace(self.swept, pictures=pictures)
 
     def _take_over(self, metrics: dict[str, str | None]) -> None:
-        """What is there of the same sweep; room is made for metrics that are not there, or were others."""
+        """Load the results of the same sweep, and create arrays for metrics that are new or have changed."""
         there = _stated(self.path)["metrics"]
         self.swept.done[...] = small(self.path, self._group, DONE, self.swept.shape)
         wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
@@ -156,7 +156,7 @@ class InStore(Results):
                     self._group[name][...] = np.nan
                 else:
                     _number(self._group, self.swept, name, self.swept.numbers[name])
-            # After them: who is killed before finds them wanting again.
+            # Written last: after a kill before this point, the metrics still count as missing.
             self._group.attrs[KEY] = {**self._group.attrs[KEY], "metrics": {**there, **metrics}}
         shape = self.swept.shape
         numbers = {name: small(self.path, self._group, name, shape) for name in (*KNOWN, *there, *wanted)}
@@ -166,12 +166,12 @@ class InStore(Results):
         with self._disk("what is told of pictures"):
             for name, values in self.swept.numbers.items():
                 self._group[name][...] = values
-            self._group[DONE][...] = self.swept.done  # last: what it says is there
+            self._group[DONE][...] = self.swept.done  # last: it declares the rest complete
         self._noted = time.monotonic()
 
     @contextmanager
     def _disk(self, what: str) -> Iterator[None]:
-        """Refusals of the disk in words."""
+        """Turn errors of the disk into `InputError`."""
         try:
             yield
         except OSError as error:
@@ -179,14 +179,14 @@ class InStore(Results):
 
 
 def open_sweep(path: str | PathLike[str]) -> Sweep:
-    """A sweep that was written to a store, finished or not; pictures are read when they are asked for.
+    """Open a sweep that was written to a store, finished or not; images are read on access.
 
     Args:
         path: folder of the store.
 
     Raises:
-        InputError: no such folder, what is no sweep, or a damaged one (the file is named). A damaged picture is
-            refused when it is read.
+        InputError: no such folder, not a sweep, or a damaged one (the message names the file). A damaged
+            image raises when it is read.
     """
     folder = expanded(path)
     with reading(folder, "a sweep"):
@@ -221,7 +221,7 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
 
 
 def _pictures_of(folder: Path, group: Any, shape: tuple[int, ...]) -> StoredPictures:
-    """The pictures of a sweep of some shape, one in each chunk."""
+    """The images of a sweep, one per chunk; the shape is checked."""
     array, n = member(folder, group, PICTURES), len(shape)
     one = (*(1,) * n, *array.shape[n:])
     if tuple(array.shape[:n]) != shape or tuple(array.chunks) != one or len(one) - n not in (2, 3):
@@ -233,14 +233,14 @@ def _pictures_of(folder: Path, group: Any, shape: tuple[int, ...]) -> StoredPict
 
 
 def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:
-    """Write a sweep that is in memory to a new store; it appears whole or not at all.
+    """Write a sweep from memory to a new store, which appears complete or not at all.
 
     Args:
         swept: the sweep.
         path: folder of the store.
 
     Raises:
-        InputError: there is something of that name; the disk refuses.
+        InputError: the path exists; the disk reports an error.
     """
     folder = Path(path).expanduser()
     check_name(folder)
@@ -254,10 +254,10 @@ def save_sweep(swept: Sweep, path: str | PathLike[str]) -> None:
 
 
 def _stated(folder: Path) -> dict[str, Any]:
-    """What a store states of a sweep.
+    """The attributes of a store that describe the sweep.
 
     Raises:
-        InputError: there is none, or a newer version than this one reads.
+        InputError: there are none, or their version is newer than this one supports.
     """
     check_path(folder, "sweep")
     if not (folder / "zarr.json").is_file():
@@ -287,7 +287,7 @@ def _opened(folder: Path, mode: Literal["r", "r+"]) -> Any:
 
 
 def _check_same(folder: Path, wanted: dict[str, Any] | None) -> None:
-    """Refuse a folder that holds anything else than the same sweep."""
+    """Raise `InputError` unless a folder contains the same sweep."""
     found = _stated(folder).get("description")
     if wanted is None or found is None:
         raise InputError(
@@ -309,7 +309,7 @@ def _make(
     metrics: dict[str, str | None],
     values: Any = None,
 ) -> None:
-    """Make the group and its arrays under a temporary name and rename it: it is there or it is not."""
+    """Create the group and its arrays under a temporary name, and rename it when complete."""
     import zarr
 
     part = part_of(folder)
@@ -356,18 +356,18 @@ def _statement(swept: Sweep, description: dict[str, Any] | None, metrics: dict[s
 
 
 def _remark(swept: Sweep) -> dict[str, str]:
-    """What xarray is told of arrays along one axis of several parameters."""
+    """The attribute with which xarray attaches several parameters to one axis."""
     return {"coordinates": " ".join(each.name for each in swept.coordinates)} if swept.in_one_batch else {}
 
 
 def _number(group: Any, swept: Sweep, name: str, values: NDArray[Any]) -> None:
-    """The array of what is told of each picture by one name."""
+    """Create the array of one number per image."""
     words = {"long_name": IN_WORDS[name]} if name in IN_WORDS else {}
     _array(group, name, values, swept.axes, _remark(swept) | words)
 
 
 def _array(group: Any, name: str, values: NDArray[Any], axes: tuple[str, ...], attributes: dict[str, Any]) -> None:
-    """A small array, in one piece, with labelled axes."""
+    """Create a small array with labelled axes, in one chunk."""
     kind = str if values.dtype.kind == "U" else values.dtype
     made = group.create_array(
         name,
@@ -382,7 +382,7 @@ def _array(group: Any, name: str, values: NDArray[Any], axes: tuple[str, ...], a
 
 
 def _make_pictures(group: Any, swept: Sweep, picture: tuple[int, ...]) -> Any:
-    """The array of pictures, one in a piece, and where on the sensor pixels are, if that is one place for all."""
+    """Create the array of images, one per chunk, and the positions of pixels if all sensors have the same."""
     from zarr.codecs import BloscCodec, Crc32cCodec
 
     remark = _remark(swept)

@@ -1,4 +1,4 @@
-"""What is told of each picture of a sweep in a number: functions of the picture, the camera with it."""
+"""Metrics of the images of a sweep: functions from an image, which includes its camera, to a number."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from vcc.camera import Camera
 from vcc.image import Image
 
 Metric = Callable[[Image], float]
-"""Any function of a picture, whose ``camera`` is what made it; it gives one number."""
+"""A function from an image to one number; the image's ``camera`` is the camera that made it."""
 
 PRIOR = 128
-"""Pixels a side of the natural pictures whose expected error R(K) is."""
+"""Side, in pixels, of the natural images over which R(K) averages."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,11 +33,12 @@ class PSNR(Brief):
     """The peak signal-to-noise ratio against a target, decibels.
 
     Args:
-        target: a picture of the same shape, as light lands on the sensor; a `vcc.Image` lies as it says itself.
-        peak: in the picture's unit; None takes the target's brightest value.
+        target: an image of the same shape, in the orientation of the sensor; a `vcc.Image` has its own
+            orientation.
+        peak: in the unit of the image; None for the target's brightest value.
 
     Raises:
-        InputError: a target that is not finite.
+        InputError: a target with values that are not finite.
     """
 
     target: ArrayLike | Image
@@ -54,7 +55,7 @@ class PSNR(Brief):
         """Decibels; 10·log₁₀(peak² / mean squared difference).
 
         Raises:
-            InputError: a picture of another shape.
+            InputError: an image of another shape.
         """
         target: NDArray[np.float64] = self.target  # type: ignore[assignment]
         if target.shape != image.shape:
@@ -66,16 +67,17 @@ class PSNR(Brief):
 
 
 def sharpness(image: Image) -> float:
-    """The energy of a picture's gradient over that of its mean: larger is sharper, whatever the exposure.
+    """The energy of an image's gradient relative to its mean: larger is sharper, independent of the exposure.
 
-    The mean over pixels of (I(r + 1, c) − I(r, c))² + (I(r, c + 1) − I(r, c))², channels averaged before, over the
-    squared mean of I: the energy of the image gradient (Subbarao, Choi and Nikzad 1993), made relative.
+    The mean over pixels of (I(r + 1, c) − I(r, c))² + (I(r, c + 1) − I(r, c))², after averaging channels,
+    over the squared mean of I: the energy of the image gradient (Subbarao, Choi and Nikzad 1993), made
+    relative.
 
     Args:
         image: two pixels or more each way.
 
     Returns:
-        A number without a unit; 0 for an even picture, not a number for a dark one.
+        A dimensionless number; 0 for a uniform image, NaN for a black one.
     """
     values = image.to_numpy().astype(np.float64)
     grey = values.mean(axis=2) if values.ndim == 3 else values
@@ -86,16 +88,17 @@ def sharpness(image: Image) -> float:
 
 @dataclass(frozen=True)
 class DeblurringError:
-    """R(K) of what a camera makes of a point (Zhou and Nayar 2009), for each pixel: smaller is better.
+    """R(K) of a camera's point spread function (Zhou and Nayar 2009), per pixel: smaller is better.
 
-    The expected mean squared error of a natural picture that is deblurred as well as a linear filter can; see
-    `vcc.analysis.expected_deblurring_error`. The kernel is the camera's point spread, whose sum is 1, or with
-    ``aperture`` the share of its light that masks pass: so apertures are compared at one exposure.
+    The expected mean squared error of a natural image after the best linear deblurring; see
+    `vcc.analysis.expected_deblurring_error`. The kernel is the camera's point spread function. Its sum is 1,
+    or with ``aperture`` the share of the light that masks transmit, which compares apertures at equal
+    exposure.
 
     Args:
         distance: of the point before the camera, metres, above 0.
-        noise: standard deviation, of pictures whose values go from 0 to 1.
-        aperture: (width, height) of the entrance plane through which light comes, metres; None finds it from the
+        noise: standard deviation, for images with values from 0 to 1.
+        aperture: (width, height) of the open part of the entrance plane, metres; None derives it from the
             camera's stops.
 
     Raises:
@@ -111,11 +114,11 @@ class DeblurringError:
         checks.above_zero("noise", self.noise, "a standard deviation")
 
     def __call__(self, image: Image) -> float:
-        """R(K) over the number of frequencies, in squared units of the picture.
+        """R(K) over the number of frequencies, in squared units of the image.
 
         Raises:
-            InputError: a picture that does not know its camera, a kernel larger than 128 pixels, or what
-                `vcc.analysis.psf` refuses.
+            InputError: an image without a camera, or a kernel larger than 128 pixels; see also
+                `vcc.analysis.psf`.
         """
         if not isinstance(image.camera, Camera):
             raise InputError("R(K) is of a camera, and this picture does not know what made it")
@@ -126,17 +129,17 @@ class DeblurringError:
 
 
 NAMED: dict[str, Metric] = {"sharpness": sharpness}
-"""Metrics that go by their name alone."""
+"""Metrics that can be given by name."""
 
 
 def metrics_of(given: Mapping[str, Metric] | Iterable[str | Metric]) -> dict[str, Metric]:
-    """Functions of a picture by name.
+    """Functions of an image by name.
 
     Args:
-        given: by name; or a list of functions that have names, and of names of ours.
+        given: functions by name; or a list of named functions and of names in `NAMED`.
 
     Raises:
-        InputError: a name that there is not, what cannot be called, a function without a name, or a name twice.
+        InputError: unknown name, not callable, a function without a name, or a repeated name.
     """
     if isinstance(given, str) or callable(given):
         raise InputError(f"metrics are a list or go by name: write [{given!r}]")
@@ -165,13 +168,13 @@ def metrics_of(given: Mapping[str, Metric] | Iterable[str | Metric]) -> dict[str
 
 
 TAKEN = ("pictures", "done", "sensor_frame", "x", "y", "row", "column", "channel", "camera", "to", "from")
-"""Names that stand for something else in a sweep's store."""
+"""Names that a sweep's store uses otherwise."""
 KNOWN = ("mean", "missing_rays", "sampling_error")
-"""What is told of every picture."""
+"""Numbers that every image gets."""
 
 
 def metrics_in_words(metrics: Mapping[str, Metric]) -> dict[str, str | None]:
-    """What metrics are, in a word each; None of functions, of which nobody can tell whether they are the same."""
+    """Fingerprints of metrics; None for Python functions, which cannot be compared."""
     found: dict[str, str | None] = {}
     for name, metric in metrics.items():
         try:
@@ -182,10 +185,10 @@ def metrics_in_words(metrics: Mapping[str, Metric]) -> dict[str, str | None]:
 
 
 def row_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
-    """All that is told of a picture, by name.
+    """All numbers of an image, by name.
 
     Raises:
-        InputError: a metric that gives no number.
+        InputError: the result of a metric is not a number.
     """
     return {
         "mean": float(image.to_numpy().mean(dtype=np.float64)),
@@ -196,10 +199,10 @@ def row_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
 
 
 def numbers_of(image: Image, metrics: Mapping[str, Metric]) -> dict[str, float]:
-    """What metrics give of a picture, by name.
+    """The results of metrics on an image, by name.
 
     Raises:
-        InputError: a metric that gives no number.
+        InputError: the result of a metric is not a number.
     """
     found = {}
     for name, metric in metrics.items():

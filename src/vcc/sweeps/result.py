@@ -1,4 +1,4 @@
-"""What a sweep gives: pictures along labelled axes, and a table."""
+"""The result of a sweep: images along labelled axes, and a table."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from vcc.sweeps.table import Table
 from vcc.sweeps.values import Varied, first_few_labels
 
 PIXEL_AXES = ("row", "column", "channel")
-"""Axes of a picture, behind those of the sweep."""
+"""Axes of an image, after those of the sweep."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Shown):
-    """The pictures that cameras record of one light field.
+    """The images that cameras record of one light field.
 
-    ``swept[3, 0]`` is the picture of a camera, a `vcc.Image`; ``swept.pictures`` holds the values of all.
+    ``swept[3, 0]`` is the image of one camera, a `vcc.Image`; ``swept.pictures`` contains the values of all.
 
     Args:
         axes: names of the axes: parameters, or ``"camera"``.
-        coordinates: the parameters and their values; along one axis each, or all along ``"camera"``.
-        numbers: what is told of each picture, by name, arrays of the sweep's shape; not a number where a picture
-            is not there yet.
-        pictures: irradiance, (…, rows, columns[, channels]), as light lands on the sensor; an array, or a
-            `vcc.sweeps.stored.StoredPictures`, of which parts are read when they are asked for. None where
-            no pictures were kept.
-        frames: from (column, row, 1) to (x, y, 1) on the sensor, metres: (3, 3), or (…, 3, 3) where they differ.
-        done: which pictures are there, of the sweep's shape.
-        cameras: the cameras, numbered through; None where a sweep was opened from a file.
+        coordinates: the parameters and their values; one axis each, or all along ``"camera"``.
+        numbers: the numbers of the images, by name, arrays of the sweep's shape; NaN for images that are not
+            done.
+        pictures: irradiance, (…, rows, columns[, channels]), in the orientation of the sensor; an array, or a
+            `vcc.sweeps.stored.StoredPictures`, which reads parts on access. None if no images were kept.
+        frames: maps from (column, row, 1) to (x, y, 1) on the sensor, metres: (3, 3), or (…, 3, 3) if they
+            differ.
+        done: which images are done, of the sweep's shape.
+        cameras: the cameras, numbered; None if the sweep was opened from a file.
     """
 
     axes: tuple[str, ...]
@@ -56,8 +56,8 @@ class Sweep(Shown):
         """A sweep of which nothing is done.
 
         Args:
-            cameras: that it goes through.
-            names: of what will be told of each picture.
+            cameras: of the sweep.
+            names: of the numbers of each image.
         """
         shape = cameras.shape
         numbers = {name: np.full(shape, np.nan) for name in names}
@@ -66,7 +66,7 @@ class Sweep(Shown):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """How many cameras there are along each axis."""
+        """The number of cameras along each axis."""
         return self.done.shape
 
     @property
@@ -76,19 +76,19 @@ class Sweep(Shown):
 
     @property
     def complete(self) -> bool:
-        """Whether all pictures are there."""
+        """Whether all images are done."""
         return bool(self.done.all())
 
     def __len__(self) -> int:
-        """How many cameras there are."""
+        """The number of cameras."""
         return self.done.size
 
     def __getitem__(self, index: int | tuple[int, ...]) -> Image:
-        """The picture of one camera: a number for each axis.
+        """The image of one camera: one index per axis.
 
         Raises:
-            InputError: other indices, a picture that is not there, or no pictures at all.
-            IndexError: a number beyond the axis.
+            InputError: other indices, an image that is not done, or no images at all.
+            IndexError: an index beyond the axis.
         """
         place = index if isinstance(index, tuple) else (index,)
         if len(place) != len(self.shape):
@@ -114,7 +114,7 @@ class Sweep(Shown):
     @property
     @cached
     def table(self) -> Table:
-        """A row for each camera: its parameters, and what is told of its picture."""
+        """One row per camera: its parameters, and the numbers of its image."""
         count, columns = len(self), {}
         for axis, each in enumerate(self.coordinates):
             places = np.indices(self.shape).reshape(len(self.shape), count)[0 if self.in_one_batch else axis]
@@ -123,10 +123,10 @@ class Sweep(Shown):
         return Table(columns, {each.name: each.unit for each in self.coordinates})
 
     def best(self, name: str, *, largest: bool = True) -> tuple[int, ...]:
-        """Where a number of the table is largest, or smallest: an index of ``swept[…]``.
+        """The index in ``swept[…]`` at which a number of the table is largest, or smallest.
 
         Raises:
-            InputError: there is no such column, or it holds no number.
+            InputError: the column does not exist, or has no finite number.
         """
         values = self.numbers.get(name)
         if values is None or not np.isfinite(values).any():
@@ -135,12 +135,12 @@ class Sweep(Shown):
         return tuple(int(n) for n in np.unravel_index(found, self.shape))
 
     def values(self, index: Sequence[int]) -> list[str]:
-        """The values of a camera's parameters in words."""
+        """The values of a camera's parameters as text."""
         places = [index[0]] * len(self.coordinates) if self.in_one_batch else index
         return [each.labels[n] for each, n in zip(self.coordinates, places, strict=True)]
 
     def labels(self, index: Sequence[int]) -> str:
-        """The same with the parameters' names, in a line."""
+        """The same with the parameters' names, in one line."""
         pairs = zip(self.coordinates, self.values(index), strict=True)
         return ", ".join(f"{each.name} {value}" for each, value in pairs)
 
@@ -160,10 +160,10 @@ class Sweep(Shown):
 
 
 class Results:
-    """Where the results of a sweep go while it is at work; here, what is told of pictures, in memory.
+    """Receiver of the results of a running sweep; this base class keeps the numbers in memory, and no images.
 
     Args:
-        swept: the sweep, whose numbers are filled in.
+        swept: the sweep; its numbers are filled in.
     """
 
     def __init__(self, swept: Sweep) -> None:
@@ -178,45 +178,45 @@ class Results:
         pass
 
     def left(self) -> list[int]:
-        """The numbers of the cameras whose pictures are not there."""
+        """The numbers of the cameras whose images are not done."""
         return [int(n) for n in np.flatnonzero(~self.swept.done)]
 
     def unreported(self, names: Iterable[str]) -> list[int]:
-        """The numbers of the cameras whose pictures are there, and not all that these metrics tell of them."""
+        """The numbers of the cameras whose images are done but lack some of these metrics."""
         lacking = np.zeros(self.swept.shape, dtype=bool)
         for name in names:
             lacking |= np.isnan(self.swept.numbers[name])
         return [int(n) for n in np.flatnonzero(lacking & self.swept.done)]
 
     def picture(self, number: int) -> Image:
-        """A picture that is there."""
+        """An image that is done."""
         return self.finished()[self.place(number)]
 
     def put(self, number: int, values: NDArray[np.float32] | None, row: Mapping[str, float]) -> None:
-        """A picture, where pictures are kept, and what is told of it."""
+        """Add an image, if images are kept, and its numbers."""
         if values is not None:
             self.keep(self.place(number), values)
         self.tell(number, row)
         self.swept.done[self.place(number)] = True
 
     def tell(self, number: int, row: Mapping[str, float]) -> None:
-        """What is told of a picture."""
+        """Add numbers of an image."""
         for name, value in row.items():
             self.swept.numbers[name][self.place(number)] = value
 
     def place(self, number: int) -> tuple[int, ...]:
-        """Where a camera stands along each axis."""
+        """The index of a camera along each axis."""
         return tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """Keep a picture."""
 
     def output_buffers(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
-        """The memory of some cameras' pictures, one after the other, to make them in; None where there is none."""
+        """The contiguous memory in which to make the images of some cameras; None if there is none."""
         return None
 
     def commit(self) -> None:
-        """What was put is to be there, come what may."""
+        """Make sure that everything added so far is kept."""
 
     def finished(self) -> Sweep:
         """The sweep with its results."""
@@ -224,11 +224,11 @@ class Results:
 
 
 class InMemory(Results):
-    """Results in memory, pictures too.
+    """Results in memory, including the images.
 
     Args:
-        swept: the sweep, whose numbers are filled in.
-        picture: the shape of all pictures.
+        swept: the sweep; its numbers are filled in.
+        picture: the shape of all images.
     """
 
     def __init__(self, swept: Sweep, picture: tuple[int, ...]) -> None:
@@ -237,7 +237,7 @@ class InMemory(Results):
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """See `Results`."""
-        if not np.may_share_memory(values, self.swept.pictures):  # else it was made there
+        if not np.may_share_memory(values, self.swept.pictures):  # otherwise it was made in place
             self.swept.pictures[place] = values
 
     def room(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:

@@ -1,4 +1,4 @@
-"""Contact sheets of sweeps: pictures side by side at one exposure, each with its values."""
+"""Contact sheets of sweeps: images side by side at one exposure, labelled with their values."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from vcc.plot.style import INK, QUIET, SMALL, TEXT, new_axes
 from vcc.sweeps.result import Sweep
 
 MOST_ACROSS, MOST_DOWN = 8, 8
-"""Pictures of a sheet along each axis; of more, some are shown, evenly spread."""
+"""Images of a sheet along each axis; if there are more, an even selection is shown."""
 IN_A_ROW = 6
-"""Pictures of one axis after which a new row begins."""
+"""Images per row, if the sweep has one axis."""
 INCHES, DOTS = 1.9, 100
-"""Width of a picture on the sheet, and its dots per inch."""
+"""Width of an image on the sheet, and its dots per inch."""
 LONGEST = 26
-"""Letters of a label in a line."""
+"""Characters of a label in one line."""
 
 Place = tuple[int, ...]
 
 
 def contact_sheet(swept: Sweep) -> Any:
-    """Pictures of a sweep side by side, upright and at one exposure, as a Matplotlib figure.
+    """A Matplotlib figure of the images of a sweep side by side, upright and at one exposure.
 
-    The last axis goes to the right, all others downwards; one axis alone goes on in the next row. Of more than 8
-    pictures each way some are shown, evenly spread. What is not done yet is left out.
+    The last axis is horizontal, all others are vertical; a single axis is broken into rows. Of more than 8
+    images each way an even selection is shown. Images that are not done are left out.
 
     Args:
-        swept: with pictures.
+        swept: with images.
 
     Raises:
-        InputError: no pictures were kept, or none is there.
+        InputError: no images were kept, or none is done.
     """
     if swept.pictures is None:
         raise InputError("this sweep kept no pictures to be shown, only the table")
@@ -65,7 +65,7 @@ def contact_sheet(swept: Sweep) -> Any:
 
 
 def _title(swept: Sweep) -> str:
-    """Which parameters go where."""
+    """The parameters along each direction."""
     names = [each.name for each in swept.coordinates]
     if len(swept.shape) == 1:
         return ", ".join(names)
@@ -73,7 +73,7 @@ def _title(swept: Sweep) -> str:
 
 
 def _chosen(shape: tuple[int, ...]) -> list[list[Place | None]]:
-    """Which pictures are shown in which row and column; None where a row has no more."""
+    """The images to show, by row and column; None for empty places of a row."""
     if len(shape) == 1:
         numbers: list[Place | None] = [(n,) for n in spread(shape[0], MOST_ACROSS * MOST_DOWN)]
         across = min(len(numbers), IN_A_ROW)
@@ -86,7 +86,7 @@ def _chosen(shape: tuple[int, ...]) -> list[list[Place | None]]:
 
 
 def _small(swept: Sweep, place: Place) -> NDArray[np.float32]:
-    """A picture, upright, of 1 or 3 channels, no larger than it is shown."""
+    """An upright image of 1 or 3 channels, no larger than it is displayed."""
     values = swept[place].upright().to_numpy()
     if values.ndim == 3 and values.shape[2] != 3:
         values = values.mean(axis=2)
@@ -104,7 +104,7 @@ def _draw(axes: Any, picture: NDArray[np.float32] | None, exposure: float) -> No
 
 
 def _label(axes: Any, swept: Sweep, place: Place, at: tuple[int, int]) -> None:
-    """The values of a picture: those along an axis once, at its row or column."""
+    """Label an image with its values; values along an axis appear once, at the row or column."""
     if len(swept.shape) == 1:
         axes.set_title(_lines(swept.values(place)), fontsize=SMALL, color=INK)
         return
@@ -117,5 +117,5 @@ def _label(axes: Any, swept: Sweep, place: Place, at: tuple[int, int]) -> None:
 
 
 def _lines(labels: Sequence[str]) -> str:
-    """Labels below one another, each no longer than a picture is wide."""
+    """Labels below one another, truncated to the width of an image."""
     return "\n".join(label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…" for label in labels)

@@ -1,4 +1,4 @@
-"""The arrays of a sweep on disk, within the boundary to files of others: what is damaged is an `InputError`."""
+"""The arrays of a sweep on disk; damaged files raise `InputError`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SWEEP = "an array of a sweep"
 
 @dataclass(frozen=True, eq=False)
 class StoredPictures:
-    """The pictures of a sweep on disk; a part is read when it is asked for, as of an array of NumPy.
+    """The images of a sweep on disk, read on access and indexed like a NumPy array.
 
     Args:
         folder: of the array.
-        array: the Zarr array, a picture in each chunk.
-        axes: how many of its axes are the sweep's; the others are a picture's.
+        array: the Zarr array, one image per chunk.
+        axes: the number of its axes that belong to the sweep; the others belong to an image.
     """
 
     folder: Path
@@ -38,12 +38,12 @@ class StoredPictures:
 
     @property
     def ndim(self) -> int:
-        """How many axes there are."""
+        """The number of axes."""
         return len(self.shape)
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of the pictures."""
+        """The type of the values."""
         kind: np.dtype[Any] = np.dtype(self.array.dtype)
         return kind
 
@@ -57,11 +57,11 @@ class StoredPictures:
         return np.asarray(self[...], dtype)
 
     def __getitem__(self, index: Any) -> NDArray[Any]:
-        """Some of the pictures, read now; NaN where a picture is not there yet.
+        """Part of the images, read now; NaN for images that are not done.
 
         Raises:
-            InputError: a file that is missing for a picture asked for by itself, damaged, or no regular file of
-                the size of a picture; no such part.
+            InputError: the file of a single requested image is missing; a file is damaged, or is not a
+                regular file of the size of an image; invalid index.
         """
         first = index[: self.axes] if isinstance(index, tuple) else (index,)
         if len(first) == self.axes and all(isinstance(n, int | np.integer) for n in first):
@@ -76,10 +76,10 @@ class StoredPictures:
 
 
 def member(folder: Path, group: Any, name: str) -> Any:
-    """The Zarr array of that name, none of which is read yet.
+    """The Zarr array of that name; its values are not read yet.
 
     Raises:
-        InputError: there is none, or its metadata cannot be used.
+        InputError: it does not exist, or its metadata is invalid.
     """
     where = folder / name / "zarr.json"
     check_file(where)
@@ -89,16 +89,16 @@ def member(folder: Path, group: Any, name: str) -> Any:
 
 
 def small(folder: Path, group: Any, name: str, *shapes: tuple[int, ...]) -> NDArray[Any]:
-    """What a small array holds, which lies in one chunk.
+    """The values of a small array, which has one chunk.
 
     Args:
         folder: of the sweep.
         group: the Zarr group.
         name: of the array.
-        shapes: those that it may have.
+        shapes: the allowed ones.
 
     Raises:
-        InputError: as `member`; another shape; a file that is damaged or larger than the array can be.
+        InputError: as `member`; another shape; a file that is damaged or too large for the array.
     """
     array = member(folder, group, name)
     with reading(folder / name, SWEEP):

@@ -1,4 +1,4 @@
-"""A sweep: the pictures that many cameras record of one light field."""
+"""A sweep: the images that many cameras record of one light field."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from vcc.sweeps.metrics import KNOWN, Metric, metrics_in_words, metrics_of, numb
 from vcc.sweeps.result import InMemory, Results, Sweep
 
 BATCH_BYTES = 2**29
-"""Of the pictures that are made together, about; each of them takes some more while it is made."""
+"""Approximate limit on the bytes of images in one batch; each takes some more while it is made."""
 SHARE_A_READING = 16
-"""Cameras that are made together of a light field on disk, at least: so it is not read for each of them."""
+"""Least number of cameras in a batch if the light field is on disk, so that it is not read for each of them."""
 MOST_TOGETHER = 1024
-"""Pictures that are made together, at most: progress is told, and results are kept, after each batch."""
+"""Largest number of images in a batch: progress is reported, and results are kept, after each batch."""
 BATCH_SAMPLES = 10**10
-"""Samples that are gone through for pictures that are made together, about: some seconds' work."""
+"""Approximate limit on the samples processed for a batch: some seconds of work."""
 
 
 def sweep(
@@ -55,41 +55,41 @@ def sweep(
     progress: Progress | None = None,
     **options: Unpack[Options],
 ) -> Sweep:
-    """The pictures that many cameras record of one light field, and a table of what is told of them.
+    """Capture the images of many cameras of one light field, with a table of numbers for each image.
 
-    Cameras that differ only in the pattern of one mask are made in one pass over the light field.
+    Cameras that differ only in the pattern of one mask share one pass over the light field.
 
     Args:
         cameras: one whose parameters change, or several (an axis ``"camera"``).
         light_field: given at the entrance plane; in memory or on disk.
-        parameters: names of parameters and their values, every combination of which is a camera: ``{"sensor.z":
-            np.linspace(50, 54, 40) * mm, "code.pattern": [mura(31), Circle(8 * mm)]}``; or a `Design`, of
-            `vcc.sweeps.listed`, `vcc.sweeps.random`, `vcc.sweeps.sobol`.
+        parameters: names of parameters and their values, every combination of which is a camera:
+            ``{"sensor.z": np.linspace(50, 54, 40) * mm, "code.pattern": [mura(31), Circle(8 * mm)]}``; or a
+            `Design` from `vcc.sweeps.listed`, `vcc.sweeps.random` or `vcc.sweeps.sobol`.
         how: as in `vcc.Camera.capture`.
-        metrics: numbers for the table, beside ``mean``, ``missing_rays`` and ``sampling_error``: functions of the
-            picture (a `vcc.Image`, whose ``camera`` made it) by name, or a list of them; ``"sharpness"``,
-            `vcc.sweeps.PSNR`, `vcc.sweeps.DeblurringError`.
-        pictures: whether pictures are kept; False keeps the table alone, and lets them differ in shape.
-        output: a folder to keep the results in, a Zarr group that xarray opens: picture by picture as they are
-            done. The same sweep goes on where it was stopped; metrics that are new are told of the pictures that
-            are there. None keeps them in memory.
-        executor: who makes the pictures, some cameras a task, each with one thread unless ``threads`` says how
-            many: any `concurrent.futures.Executor`, or a ``dask.distributed.Client``, which stay open. The
-            light field is then in a store, or at most 64 MiB of a NumPy array. None makes them here.
-        progress: called with (done, total) in pictures.
+        metrics: numbers for the table, in addition to ``mean``, ``missing_rays`` and ``sampling_error``:
+            functions of the image (a `vcc.Image`, whose ``camera`` made it) by name, or a list of them;
+            ``"sharpness"``, `vcc.sweeps.PSNR`, `vcc.sweeps.DeblurringError`.
+        pictures: whether images are kept; False keeps only the table, and allows images of different shapes.
+        output: a folder for the results, a Zarr group that xarray opens; each image is written when it is
+            done. The same sweep resumes where it was stopped; new metrics are computed from the images in the
+            store. None keeps the results in memory.
+        executor: makes the images, some cameras per task, each with one thread unless ``threads`` is given:
+            any `concurrent.futures.Executor`, or a ``dask.distributed.Client``; both stay open. The light
+            field must then be in a store, or be a NumPy array of at most 64 MiB. None uses this process.
+        progress: called with (done, total) in images.
         options: as in `vcc.Camera.capture`.
 
     Returns:
-        Pictures along labelled axes, and the table.
+        Images along labelled axes, and the table.
 
     Warns:
-        ResultWarning: what `vcc.Camera.capture` warns of, once for each kind, with the number of cameras.
+        ResultWarning: the warnings of `vcc.Camera.capture`, once for each kind, with the number of cameras.
 
     Raises:
-        InputError: a parameter that there is not (those that there are are listed), values that a camera does not
-            take (named), pictures of different shapes, more pictures than there is memory for, what a metric or
-            `vcc.Camera.capture` refuses, with the camera's values; an output that is something else or another
-            sweep (what differs is named), or a disk that refuses: what was done is kept.
+        InputError: unknown parameter (the message lists the available ones), values that a camera rejects
+            (named), images of different shapes, too little memory for the images; errors of a metric or of
+            `vcc.Camera.capture`, with the camera's values; an output that is something else or another sweep
+            (the message names the difference), or an error of the disk: earlier results are kept.
     """
     check_is_light_field(light_field)
     listed = cameras_of(cameras, parameters)
@@ -105,14 +105,14 @@ def sweep(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Work(Brief):
-    """What a sweep has to do.
+    """The work of a sweep.
 
     Args:
         cameras: all of them.
-        light_field: of which they make pictures.
-        how: they do.
-        metrics: told of each picture.
-        pictures: whether they are kept.
+        light_field: before the cameras.
+        how: how the images are made.
+        metrics: of each image.
+        pictures: whether images are kept.
     """
 
     cameras: Cameras
@@ -122,20 +122,20 @@ class Work(Brief):
     pictures: bool
 
     def check_names(self) -> None:
-        """Refuse a metric that is called as a parameter is: both are columns of one table.
+        """Check that no metric has the name of a parameter: both are columns of one table.
 
         Raises:
-            InputError: one is.
+            InputError: one has.
         """
         for name in self.metrics:
             if name in (each.name for each in self.cameras.varied):
                 raise InputError(f"two columns of a table cannot both be {name!r}: name the metric otherwise")
 
     def picture_shape(self) -> tuple[int, ...]:
-        """The shape of all pictures.
+        """The shape of all images.
 
         Raises:
-            InputError: they have different ones.
+            InputError: the shapes differ.
         """
         shapes = {sensor.shape: number for number, sensor in enumerate(self.cameras.sensors)}
         if len(shapes) > 1:
@@ -148,10 +148,10 @@ class Work(Brief):
         return (*next(iter(shapes)), *self.light_field.grid.shape[4:])
 
     def check_memory(self) -> None:
-        """Refuse more pictures than there is memory for.
+        """Check that the images fit in memory.
 
         Raises:
-            InputError: there are.
+            InputError: they do not.
         """
         shape = (*self.cameras[0].sensor.shape, *self.light_field.grid.shape[4:])
         what = f"{len(self.cameras)} pictures of {'×'.join(map(str, shape))}"
@@ -159,14 +159,14 @@ class Work(Brief):
         check_memory(4 * len(self.cameras) * math.prod(shape), None, what, way_out)
 
     def batches(self, todo: Sequence[int], places: int = 0) -> Iterator[list[int]]:
-        """Cameras that are made together, in an order in which as many as can share their work.
+        """Batches of cameras, ordered so that as many as possible share their work.
 
-        All of those with any that is to be made: made with others, a picture may differ by rounding, and a sweep
-        that was stopped is to be the same as one that was not.
+        A batch is complete even if only some of its images are missing: the composition of a batch can change
+        rounding, and a resumed sweep must equal an uninterrupted one.
 
         Args:
-            todo: the numbers of the cameras whose pictures are to be made.
-            places: where batches are made side by side; 0 for one after the other.
+            todo: the numbers of the cameras whose images are missing.
+            places: the number of batches that run in parallel; 0 for one after the other.
         """
         wanted, ordered = set(todo), self.cameras.alike()
         count = self.batch_size() if wanted else 1
@@ -178,7 +178,7 @@ class Work(Brief):
                 yield batch
 
     def batch_size(self) -> int:
-        """How many cameras are made together: as many as there is memory for, and a few seconds' work."""
+        """The number of cameras in a batch: limited by memory, and to a few seconds of work."""
         camera, channels = self.cameras[0], self.light_field.grid.channels or 1
         pixels = math.prod(camera.sensor.shape) * channels
         samples = camera.compile(self.light_field, self.how).samples_touched * channels
@@ -187,10 +187,10 @@ class Work(Brief):
         return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), within_time)))
 
     def results(self, output: str | PathLike[str] | None) -> Results:
-        """Where results go; what is there already of the same sweep is kept.
+        """The receiver of the results, with existing results of the same sweep.
 
         Raises:
-            InputError: pictures of different shapes; what `vcc.sweeps.keeping.InStore` refuses.
+            InputError: images of different shapes; see also `vcc.sweeps.keeping.InStore`.
         """
         swept = Sweep.empty(self.cameras, (*KNOWN, *self.metrics))
         picture = self.picture_shape() if self.pictures else None
@@ -200,7 +200,7 @@ class Work(Brief):
         return Results(swept) if picture is None else InMemory(swept, picture)
 
     def run(self, results: Results, executor: Any, progress: Progress | None) -> None:
-        """Make the pictures that are not there yet, and tell what is not told of those that are."""
+        """Make the missing images, and compute missing metrics of existing images."""
         todo, untold, remarks = results.left(), results.unreported(self.metrics), Notices()
         done, total = len(self.cameras) - len(todo) - len(untold), len(self.cameras)
         made = (
@@ -213,14 +213,14 @@ class Work(Brief):
         remarks.say(total, "cameras")
 
     def reported(self, results: Results, untold: Sequence[int]) -> Iterator[int]:
-        """What metrics give of pictures that are there, put; how many each time."""
+        """Compute and add metrics of existing images; yield the number of images each time."""
         for number in untold:
             with checks.within(self.cameras.said(number)):
                 results.tell(number, numbers_of(results.picture(number), self.metrics))
             yield 1
 
     def put(self, results: Results, todo: set[int], made: Iterable[Rows]) -> Iterator[int]:
-        """Pictures that are made, put; how many each time."""
+        """Add new images; yield the number of images each time."""
         for rows in made:
             lacking = [row for row in rows if row[0] in todo]
             for number, values, numbers in lacking:
@@ -228,48 +228,48 @@ class Work(Brief):
             yield len(lacking)
 
     def made_here(self, todo: Sequence[int], results: Results, remarks: Notices) -> Iterator[Rows]:
-        """The pictures of cameras, some at a time."""
+        """The images of cameras, made in this process."""
         for batch in self.batches(todo):
             with remarks.gathered():
                 for row in rows_of(self, batch, results.output_buffers):
                     yield [row]
 
     def made_by(self, executor: Any, todo: Sequence[int], remarks: Notices) -> Iterator[Rows]:
-        """The same by an executor, as they come.
+        """The same by an executor, in order of completion.
 
         Raises:
-            InputError: a light field in memory that is too large to be sent; what `vcc.run.executors` refuses.
+            InputError: a light field in memory that is too large to be sent; see also `vcc.run.executors`.
         """
         check_portable(self.light_field)
         workers = worker_pool(executor)
         if self.how.between_views == "depth":
-            self.light_field.grid.disparities.maps()  # found once, and sent
+            self.light_field.grid.disparities.maps()  # computed once, and sent
         batches = list(self.batches(todo, workers.places))
         limit = math.ceil(memory_of_task(self.how.memory_limit, workers))
         alone = replace(self, how=replace(self.how, threads=self.how.threads or 1, memory_limit=limit))
-        with remarks.gathered():  # by threads of this process
+        with remarks.gathered():  # from threads of this process
             for _, (rows, elsewhere) in workers.each(Task(rows_elsewhere, (alone, os.getpid())), batches):
                 remarks.add(elsewhere)
                 yield rows
 
 
 Row = tuple[int, NDArray[np.float32] | None, dict[str, float]]
-"""Of a camera: its number, its picture where pictures are kept, and what is told of it."""
+"""The number of a camera, its image if images are kept, and the numbers of the image."""
 Rows = list[Row]
 
 
 def rows_of(
     work: Work, batch: Sequence[int], output_buffers: OutputBuffers = lambda numbers: None
 ) -> Iterator[Row]:
-    """The pictures of some cameras, with what is told of them, as they are made.
+    """The images of some cameras with their numbers, in order of completion.
 
     Args:
-        work: what is to be done.
+        work: of the sweep.
         batch: the numbers of these cameras.
         output_buffers: for the images.
 
     Raises:
-        InputError: what a camera or a metric refuses, with the camera's values.
+        InputError: errors of a camera or a metric, with the camera's values.
     """
 
     def buffers_of(places: Sequence[int]) -> NDArray[np.float32] | None:
@@ -283,7 +283,7 @@ def rows_of(
 
 
 def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Notices]:
-    """The same as a task, and what is remarked, unless it is said in the process that asks."""
+    """The same as a task; also returns the warnings, unless it runs in the requesting process."""
     (work, asking), remarks = shared, Notices()
     if os.getpid() == asking:
         return list(rows_of(work, batch)), remarks

@@ -1,4 +1,4 @@
-"""A table with one row for each camera of a sweep, and the files that it goes to."""
+"""A table with one row per camera of a sweep, and its file formats."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vcc.files.atomic import atomic_path
 
 ENDINGS = (".csv", ".parquet")
 SHOWN = 12
-"""Rows that are printed; the others are counted."""
+"""Rows that are printed; further ones are counted."""
 
 
 def _short(value: Any) -> str:
@@ -28,12 +28,12 @@ def _short(value: Any) -> str:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Table(Brief):
-    """Columns of equal length by name: the parameters, SI units or words, then what is told of each picture.
+    """Columns of equal length by name: the parameters, in SI units or as text, then the numbers of each image.
 
     ``table["sensor.z"]`` is a column, ``pandas.DataFrame(table.columns)`` the table for pandas.
 
     Args:
-        columns: arrays of numbers or words.
+        columns: arrays of numbers or text.
         units: of columns that have one, such as "m".
     """
 
@@ -44,7 +44,7 @@ class Table(Brief):
         """A column.
 
         Raises:
-            InputError: there is none of that name; those that there are are listed.
+            InputError: unknown name; the message lists the available ones.
         """
         if name not in self.columns:
             raise InputError(f"the table has no column {name!r}: it has {', '.join(self.columns)}")
@@ -67,16 +67,16 @@ class Table(Brief):
         return [f"{name} [{self.units[name]}]" if self.units.get(name) else name for name in self.columns]
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the table; the ending of ``path`` chooses the format.
+        """Write the table; the ending of ``path`` selects the format.
 
-        - ``.csv``: a line of headings, then a line for each camera; numbers give the same float back
+        - ``.csv``: a line of headings, then a line for each camera; numbers are written with full precision
         - ``.parquet``: the same columns with their types (extra ``parquet``)
 
         Args:
-            path: where to; a file of that name is replaced.
+            path: the file; an existing one is replaced.
 
         Raises:
-            InputError: another ending, a folder that cannot be written to, no arro3 for Parquet.
+            InputError: another ending, a folder that cannot be written to, arro3 is missing (for Parquet).
         """
         file = Path(path).expanduser()
         ending = checks.ending("a table", file, *ENDINGS)
@@ -97,6 +97,6 @@ class Table(Brief):
             core.Array(column.tolist(), kinds.get(column.dtype.kind, core.DataType.string()))
             for column in self.columns.values()
         ]
-        packed = BytesIO()  # told to write to a disk that is full, it panics
+        packed = BytesIO()  # in memory first: arro3 panics if the disk is full
         io.write_parquet(core.Table.from_arrays(arrays, names=self.headings), packed)
         path.write_bytes(packed.getbuffer())

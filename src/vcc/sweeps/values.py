@@ -1,4 +1,4 @@
-"""The values of a parameter, as they are given: numbers and things, or words as camera files have them."""
+"""The values of a parameter: numbers and objects, or text as in camera files."""
 
 from __future__ import annotations
 
@@ -27,24 +27,24 @@ from vcc.shapes.patterns import Cells
 HERE = Beside(Path())
 """The files of the current folder."""
 MOST_VALUES = 10**6
-"""Of a range in words."""
+"""Values of a range given as text."""
 SI = {"length": "m", "angle": "rad", "time": "s", None: ""}
 """Units of coordinates."""
 
 _EXAMPLES = {"length": "50mm:54mm:40", "angle": "0deg:30deg:7", "time": "1ms:5ms:5", None: "0.5:1:6"}
-"""Ranges in words, by what is in them."""
+"""Example ranges as text, by dimension."""
 _OPENS, _CLOSES = "[{(", "]})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Varied(Brief):
-    """A parameter, and the values that it takes.
+    """A parameter and its values.
 
     Args:
-        name: as `vcc.learn.parameters` has it.
-        values: as the camera takes them, SI units.
-        labels: the values in words.
-        unit: of values that are numbers: "m", "rad", "s"; "" for plain numbers and what are none.
+        name: as in `vcc.learn.parameters`.
+        values: as the camera accepts them, SI units.
+        labels: the values as text.
+        unit: of numeric values: "m", "rad", "s"; "" for dimensionless numbers and other values.
     """
 
     name: str
@@ -56,28 +56,28 @@ class Varied(Brief):
         return len(self.values)
 
     def taken(self, places: Iterable[int]) -> Varied:
-        """The values at some places, in that order."""
+        """The values with these indices, in that order."""
         listed = list(places)
         values, labels = (tuple(each[n] for n in listed) for each in (self.values, self.labels))
         return dataclasses.replace(self, values=values, labels=labels)
 
     @property
     def coordinates(self) -> NDArray[Any]:
-        """Numbers, where the values are such; else the labels."""
+        """The values if all are numbers, otherwise the labels."""
         if self.values and all(type(each) in (int, float) for each in self.values):
             return np.array(self.values)
         return np.array(self.labels)
 
     @property
     def values_in_words(self) -> str:
-        """From where to where it goes."""
+        """The range of values, or the first few, as text."""
         if len(self) > 2 and self.coordinates.dtype.kind in "if":
             return f"{self.labels[0]} … {self.labels[-1]}, {len(self)} values"
         return first_few_labels(self.labels)
 
 
 def first_few_labels(labels: Sequence[str], most: int = 4) -> str:
-    """Labels in a line, not too many."""
+    """Labels in one line, the first few of many."""
     return ", ".join(labels[:most]) + (f" … ({len(labels)})" if len(labels) > most else "")
 
 
@@ -85,14 +85,14 @@ def varied(train: Train, name: str, given: Any, beside: Beside = HERE) -> Varied
     """The values of a parameter.
 
     Args:
-        train: whose parameter.
-        name: of it.
-        given: values in a list or an array; or words: ``"50mm:54mm:40"``, so many in even steps,
-            ``"50 mm, 52 mm"``, ``"mura, circle"``. Each value may be in words itself, as a camera file has it.
-        beside: the files that words may name.
+        train: the camera that has the parameter.
+        name: of the parameter.
+        given: values in a list or an array; or text: ``"50mm:54mm:40"``, 40 values in equal steps, ``"50 mm,
+            52 mm"``, ``"mura, circle"``. Each value may be text itself, as in a camera file.
+        beside: the files that text may name.
 
     Raises:
-        InputError: there is no such parameter; no values; words that are none.
+        InputError: unknown parameter; no values; invalid text.
     """
     found, in_words = place(train, name), False
     listed: Sequence[Any]
@@ -118,10 +118,10 @@ def _of(found: Parameter, listed: Sequence[Any], beside: Beside = HERE, in_words
 
 
 def range_of(train: Train, name: str, given: Any) -> tuple[float, float] | None:
-    """The ends of an interval: of two numbers in a tuple, or of ``"50mm:54mm"``; None for what is none.
+    """The ends of an interval, from two numbers in a tuple or from ``"50mm:54mm"``; None for anything else.
 
     Raises:
-        InputError: there is no such parameter; ends that are no finite numbers.
+        InputError: unknown parameter; ends that are not finite numbers.
     """
     found = place(train, name)
     if isinstance(given, str):
@@ -139,15 +139,15 @@ def range_of(train: Train, name: str, given: Any) -> tuple[float, float] | None:
 
 
 def taking(train: Train, name: str, numbers: Sequence[float]) -> Varied:
-    """A parameter that takes these numbers, SI units."""
+    """A parameter with these numbers as values, SI units."""
     return _of(place(train, name), list(numbers))
 
 
-# --- words ---
+# --- text ---
 
 
 def _range_in(given: str, found: Parameter) -> list[float] | None:
-    """Numbers in even steps, of words like ``"50mm:54mm:40"``; None for other words."""
+    """Numbers in equal steps from text like ``"50mm:54mm:40"``; None for other text."""
     if ":" not in given or not _is_number(found):
         return None
     parts = [part.strip() for part in given.split(":")]
@@ -172,12 +172,12 @@ def _range_in(given: str, found: Parameter) -> list[float] | None:
 
 
 def _is_number(found: Parameter) -> bool:
-    """Whether a parameter takes numbers, with a unit or without."""
+    """Whether a parameter is a number, with a unit or without."""
     return _dimension(found) is not None or type(found.value) in (int, float)
 
 
 def _quantities(parts: Sequence[Any], found: Parameter) -> list[float] | None:
-    """Numbers of a parameter's unit, finite; None where one is none."""
+    """Finite numbers in the parameter's unit; None if a part is not one."""
     dimension, numbers = _dimension(found), []
     for part in parts:
         try:
@@ -191,7 +191,7 @@ def _quantities(parts: Sequence[Any], found: Parameter) -> list[float] | None:
 
 
 def _parted(text: str) -> list[Any]:
-    """What stands between commas, those in brackets and quotes aside, as TOML has it; else as text."""
+    """The parts between commas, except commas in brackets and quotes, parsed as TOML if possible, or as text."""
     depth, quote, parts = 0, "", [""]
     for letter in text:
         if quote:
@@ -214,7 +214,7 @@ def _written(part: str) -> Any:
 
 
 def _value(found: Parameter, given: Any, beside: Beside, in_words: bool) -> Any:
-    """A value as the camera takes it; of numbers in words those with a dimension have a unit."""
+    """A value as the camera accepts it; numbers with a dimension in text must have a unit."""
     if isinstance(given, np.generic):
         given = given.item()
     in_words = in_words or isinstance(given, str | dict) or (isinstance(given, list) and _has_text(given))
@@ -235,7 +235,7 @@ def _as_tuple(given: Any) -> Any:
 
 
 def _sized(name: str, mask: Mask, beside: Beside) -> Any:
-    """The table of a pattern that is given by its name alone, as large as the mask that it takes the place of.
+    """The table of a pattern that is given by name alone, with the size of the mask that it replaces.
 
     A circle or polygon is as wide as the mask, a MURA has as many cells as its array.
     """
@@ -269,7 +269,7 @@ def _dimension(found: Parameter) -> str | None:
 
 
 def _label(value: Any, given: Any, number: int, dimension: str | None) -> str:
-    """A value in words: as it was given in words, else in brief."""
+    """A value as text: as it was given if it was text, otherwise a short description."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):

@@ -1,1 +1,1 @@
-"""``vcc synth``: light fields made of scenes, each renderer a command of its own."""
+"""``vcc synth``: light fields rendered from scenes, one command per renderer."""

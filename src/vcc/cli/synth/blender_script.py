@@ -1,4 +1,4 @@
-"""``vcc synth blender-script``: a script that makes the user's own Blender render the views."""
+"""``vcc synth blender-script``: a script with which the user's own Blender renders the views."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,9 +35,9 @@ def blender_script(
 
     Args:
         output: The script to write.
-        folder: Where Blender puts the views; beside the .blend file if it is relative.
-        format: exr is linear; png is sRGB, cut at radiance 1.
-        engine: What renders in Blender.
+        folder: Folder for the views; relative to the .blend file.
+        format: exr is linear; png is sRGB, clipped at radiance 1.
+        engine: The render engine of Blender.
         samples: Per pixel. Default: as in the file.
         camera: The camera in the middle of the views. Default: the scene's.
     """

@@ -1,4 +1,4 @@
-"""``vcc synth demo``: scenes of ours."""
+"""``vcc synth demo``: built-in scenes."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -24,9 +24,9 @@ class ViewsOfScene(ViewsAndPixels):
     """Where the views are.
 
     Args:
-        aperture: Side of the square that the views fill. Default: what the scene is made for.
-        field_of_view: Angle that the width of a picture spans. Default: what the scene is made for.
-        focus_distance: Where the views converge, or inf for parallel. Default: what the scene is made for.
+        aperture: Side of the square that the views fill. Default: set by the scene.
+        field_of_view: Angle that the width of a view spans. Default: set by the scene.
+        focus_distance: Where the views converge, or inf for parallel. Default: set by the scene.
     """
 
     aperture: Lengths | None = None
@@ -48,7 +48,7 @@ def demo(
     """Render a scene of ours by Mitsuba: glass, gold and gloss, at several depths.
 
     Args:
-        name: Which scene.
+        name: The scene.
     """
     output, scene = check_store(output), demo_scene(name)
     cameras = where.cameras(

@@ -24,10 +24,10 @@ class ReadingDepth:
     """How the picture and its depth are read.
 
     Args:
-        meaning: Whether DEPTH holds distances, or disparities in pixels per view, positive nearer than where they
-            converge.
-        depth_unit: What a value of 1 in DEPTH stands for, "1 mm" in most 16-bit files.
-        transfer: How whole numbers in PICTURE stand for light; auto: as the file says, srgb where it says nothing.
+        meaning: Whether DEPTH contains distances, or disparities in pixels per view, positive nearer than the
+            convergence.
+        depth_unit: The length of a value of 1 in DEPTH, "1 mm" in most 16-bit files.
+        transfer: Encoding of integers in PICTURE; auto: as the file states, srgb if it does not.
     """
 
     meaning: Literal["depth", "disparity"] = "depth"
@@ -65,7 +65,7 @@ def depth(
     """Make the views around a picture from its depth; what no picture shows is made up behind edges.
 
     Args:
-        picture: What the middle view sees.
+        picture: The middle view.
         depth: Of the same pixels: .exr, .pfm, .npy, .tif or 16-bit .png; one channel.
     """
     output = check_store(output)

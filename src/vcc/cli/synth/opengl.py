@@ -18,7 +18,7 @@ from vcc.sources.opengl import OpenGLRenderer, Vector, Viewpoint
 
 
 def vector(text: str, option: str) -> Vector:
-    """Three numbers with commas between them.
+    """Three numbers separated by commas.
 
     Raises:
         InputError: anything else.
@@ -43,10 +43,10 @@ class ViewsOfMeshes(ViewsAndPixels):
     """Where the views are.
 
     Args:
-        aperture: Side of the square that the views fill, "20 mm"; two of them are height and width. Default: a
-            fiftieth of the distance to the nearest thing.
-        focus_distance: Where the views converge, "1.3 m", or inf for parallel. Default: in the middle of what is
-            seen.
+        aperture: Side of the square that the views fill, "20 mm"; two lengths are height and width. Default:
+            a fiftieth of the distance to the nearest object.
+        focus_distance: Where the views converge, "1.3 m", or inf for parallel. Default: in the middle of the
+            visible depth.
     """
 
     aperture: Lengths | None = None
@@ -56,13 +56,13 @@ class ViewsOfMeshes(ViewsAndPixels):
 @Parameter(name="*", group=WHERE)
 @dataclass(frozen=True, kw_only=True)
 class Looking:
-    """Which way the views look.
+    """The direction of the views.
 
     Args:
-        eye: Where the middle of the views stands, in the scene's units. Default: where all is seen.
-        target: What it looks at, with --eye. Default: straight along −z.
+        eye: Position of the middle view, in the scene's units. Default: where the whole scene is visible.
+        target: The point that it faces, with --eye. Default: straight along −z.
         direction: Without --eye: from the scene to the views. glTF's front is +z.
-        up: Upwards in the pictures.
+        up: The upward direction in the views.
     """
 
     eye: Position | None = None
@@ -78,7 +78,7 @@ class Looking:
     def renderer(
         self, meshes: list[Path], narrow: CameraArray, background: Vector, supersampling: int
     ) -> OpenGLRenderer:
-        """A renderer of meshes from where --eye is, or else where ``narrow`` views see them all."""
+        """A renderer of meshes from --eye, or else from where the views ``narrow`` show all of them."""
         if self.eye is None:
             return OpenGLRenderer.fitted(
                 meshes,
@@ -109,8 +109,8 @@ def opengl(
 
     Args:
         mesh: Files .glb, .gltf, .obj or .ply, in one scene.
-        background: Linear radiance where nothing is.
-        supersampling: Pixels each way drawn for one, and averaged.
+        background: Linear radiance of the background.
+        supersampling: Samples per pixel, each way, that are averaged.
     """
     output = check_store(output)
     narrow = dataclasses.replace(where, views=(1, 1), aperture=1.0, focus_distance=math.inf).cameras()

@@ -25,7 +25,7 @@ def pbrt(
 
     Args:
         scene: A scene of PBRT version 4, .pbrt.
-        samples: Paths per pixel. Default: as many as the scene's sampler says.
+        samples: Paths per pixel. Default: from the scene's sampler.
     """
     output, cameras = check_store(output), where.cameras()
     make(PbrtRenderer(scene, samples=samples, seed=seed, metres_per_unit=unit), cameras, output, dtype)

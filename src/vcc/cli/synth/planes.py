@@ -34,8 +34,8 @@ def planes(
     """Render pictures on planes, the nearer ones before the others.
 
     Args:
-        plane: A picture on a plane that faces the camera, its middle on the axis; clear where a PNG is. May be
-            given more than once. Default: the demo's scene, leaves before a test chart before a town.
+        plane: A picture on a plane that faces the camera, centred on the axis; transparent where a PNG is.
+            May be given more than once. Default: the demo's scene, leaves before a test chart before a town.
     """
     output, cameras = check_store(output), where.cameras()
     scene = PlanesScene([_plane(text) for text in plane]) if plane else demo_scene()
@@ -43,9 +43,10 @@ def planes(
 
 
 class _PlanesAtOnce:
-    """A scene of planes whose views are all made when the first is asked for: a hundred times as fast.
+    """A scene of planes whose views are all rendered at the first request: a hundred times as fast.
 
-    Where views are not as far apart down as across, `PlanesScene.light_field` cannot, and each is made by itself.
+    If the spacings down and across differ, `PlanesScene.light_field` does not apply, and views are rendered
+    singly.
     """
 
     def __init__(self, scene: PlanesScene, cameras: CameraArray, dtype: str) -> None:
@@ -76,7 +77,7 @@ class _PlanesAtOnce:
 
 
 def _plane(text: str) -> TexturedPlane:
-    """A plane from "FILE, DISTANCE, WIDTH"; a comma in the file's name is the file's."""
+    """A plane from "FILE, DISTANCE, WIDTH"; the name of the file may contain commas."""
     parts = text.rsplit(",", 2)
     if len(parts) != 3:
         raise InputError(f'--plane is "{text}": write "FILE, DISTANCE, WIDTH", like "leaf.png, 0.8 m, 30 cm"')

@@ -1,4 +1,4 @@
-"""Options that renderers share, and what is made of them.
+"""Options that renderers share, and the rendering itself.
 
 A renderer's command is a function that ends in `make`; `vcc.cli.app` names it.
 """
@@ -54,13 +54,13 @@ Variant = Annotated[
 @Parameter(name="*", group=WHERE)
 @dataclass(frozen=True, kw_only=True)
 class Views:
-    """Where the views are; what is None is left to the scene.
+    """Where the views are; None leaves the choice to the scene.
 
     Args:
         views: Rows and columns of views.
-        aperture: Side of the square that the views fill, "20 mm"; two of them, "10 mm, 20 mm", are height and
+        aperture: Side of the square that the views fill, "20 mm"; two lengths, "10 mm, 20 mm", are height and
             width.
-        field_of_view: Angle that the width of a picture spans, "40 deg".
+        field_of_view: Angle that the width of a view spans, "40 deg".
         focus_distance: Where the views converge, "1.3 m", or inf for parallel.
     """
 
@@ -70,13 +70,13 @@ class Views:
     focus_distance: Length | None = 1.3
 
     def cameras(self, **otherwise: Any) -> CameraArray:
-        """Where the cameras stand.
+        """The cameras of the views.
 
         Args:
-            otherwise: arguments of `CameraArray.over_aperture` for what is not told.
+            otherwise: arguments of `CameraArray.over_aperture` for options that are None.
 
         Raises:
-            InputError: what that refuses.
+            InputError: see `CameraArray.over_aperture`.
         """
         asked = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         told = {name: value for name, value in asked.items() if value is not None}
@@ -85,7 +85,7 @@ class Views:
 
 @dataclass(frozen=True, kw_only=True)
 class ViewsAndPixels(Views):
-    """Where the views are, and how fine.
+    """Where the views are, and their resolution.
 
     Args:
         pixels: Rows and columns of a view's pixels.
@@ -95,10 +95,10 @@ class ViewsAndPixels(Views):
 
 
 def check_store(path: Path) -> Path:
-    """Refuse a place where no store can be, before a scene is loaded.
+    """Check that a store can be written at this path, before a scene is loaded.
 
     Raises:
-        InputError: a name that does not end in .zarr, or a folder that is not there.
+        InputError: a name that does not end in .zarr, or a folder that does not exist.
     """
     path = path.expanduser()
     checks.ending("a store", path, ".zarr")
@@ -108,10 +108,10 @@ def check_store(path: Path) -> Path:
 
 
 def make(renderer: Renderer, cameras: CameraArray, output: Path, dtype: str) -> None:
-    """Render all views into a store, with a bar and the time left, and say what came of it.
+    """Render all views into a store, with a progress bar, and print a summary.
 
     Raises:
-        InputError: what `synthesize` refuses.
+        InputError: see `synthesize`.
     """
     try:
         with progress("Rendering views") as advance:

@@ -115,6 +115,8 @@ def blurs_or_why_not(
     for stage in train.stages:
         if stage.faces.bending is not None:
             return f"{stage.element.label} bends rays by a function of position that is not affine"
+        if stage.term is not None and stage.term.mixes:
+            return f"{stage.element.label} depends on place and slope along one axis at once"
     blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", kernels)
     if isinstance(blurs, Blurs) and blurs.picture is not None:
         rows, columns = (n + m for n, m in zip(train.sensor.shape, blurs.picture.shape, strict=True))

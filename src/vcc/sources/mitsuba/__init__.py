@@ -1,4 +1,4 @@
-"""Light fields from Mitsuba 3: its renderer behind an array of shifted cameras, and scenes of our own."""
+"""Light fields from Mitsuba 3: its renderer with an array of shifted cameras, and demo scenes."""
 
 from vcc.sources.mitsuba.renderer import MitsubaRenderer, variant_fault
 from vcc.sources.mitsuba.scenes import SCENES, DemoScene, demo_scene

@@ -1,4 +1,4 @@
-"""Pictures by Mitsuba 3: any of its scenes, seen by shifted perspective cameras."""
+"""Rendering of views by Mitsuba 3: any Mitsuba scene, seen by shifted perspective cameras."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from vcc.base.reading import expanded, is_file, read_bytes, reading
 from vcc.sources.views import ViewCamera
 
 FAST, PLAIN = "llvm_ad_rgb", "scalar_rgb"
-"""The variant that is several times faster and needs LLVM 16 or newer, and the one that runs everywhere."""
+"""The variant that is several times faster and needs LLVM 16 or newer, and the variant that runs everywhere."""
 
 _PROBE_SECONDS = 180
 _PROBE = """
@@ -46,10 +46,10 @@ sum(float(value) for value in picture.array)
 
 
 def mitsuba_library() -> Any:
-    """The package mitsuba.
+    """Import the package mitsuba.
 
     Raises:
-        InputError: it is not installed, or does not load.
+        InputError: the package is not installed or does not load.
     """
     with checks.package("rendering by Mitsuba", "mitsuba", "mitsuba"):
         import mitsuba
@@ -58,13 +58,13 @@ def mitsuba_library() -> Any:
 
 @functools.cache
 def variant_fault(variant: str) -> str | None:
-    """Why a variant of Mitsuba does not work on this machine; None if it does.
+    """The reason why a variant of Mitsuba does not work on this machine; None if it works.
 
-    Those that compile while they run (LLVM, CUDA) end the whole process where a library is too old, so that a
-    child process tries it, with a picture of a few pixels. Asked once per process.
+    Variants with a just-in-time compiler (LLVM, CUDA) terminate the process if a library is too old, so a child
+    process tries the variant with an image of a few pixels. The result is cached per process.
 
     Args:
-        variant: its name, like ``"llvm_ad_rgb"``.
+        variant: name of the variant, like ``"llvm_ad_rgb"``.
 
     Raises:
         InputError: Mitsuba is not installed, or has no such variant.
@@ -85,15 +85,15 @@ def variant_fault(variant: str) -> str | None:
     said = [line for line in tried.stderr.splitlines() if line.strip()]
     telling = [line.strip() for line in said if "error" in line.lower() or "could not" in line.lower()]
     words = (telling or [line.strip() for line in said[-1:]] or ["it said nothing"])[0]
-    words = words.split(": 0x")[0][:160]  # LLVM goes on with addresses
+    words = words.split(": 0x")[0][:160]  # LLVM appends addresses
     return f"a trial of it ended with code {tried.returncode}: {words}"
 
 
 def _chosen(wanted: str) -> str:
-    """The variant to render with: one that works.
+    """Select a variant that works.
 
     Raises:
-        InputError: the one asked for does not.
+        InputError: the requested variant does not work.
     """
     mitsuba = mitsuba_library()
     if wanted == "auto":
@@ -119,7 +119,7 @@ def _chosen(wanted: str) -> str:
 
 @contextmanager
 def _variant(name: str) -> Iterator[Any]:
-    """Mitsuba with a variant set; the one before is set again afterwards, if there was one."""
+    """Context with a Mitsuba variant set; restores the previous variant, if there was one."""
     mitsuba = mitsuba_library()
     before = mitsuba.variant()
     if before == name:
@@ -134,24 +134,24 @@ def _variant(name: str) -> Iterator[Any]:
 
 
 class MitsubaRenderer:
-    """A scene of Mitsuba 3, rendered by shifted perspective cameras in place of its own.
+    """Renders a scene of Mitsuba 3 with shifted perspective cameras in place of its own.
 
-    The scene is loaded once. Its own sensor says where the middle of the array stands and where it looks, which
-    sampler is used, how near and far it sees and in which medium it is; its field of view and film give way to
-    those of the views. Pixels are boxes, so that a sample is the mean over its pixel; each view has its own seed.
-    A scene without an integrator is rendered by path tracing.
+    The scene is loaded once. Its own sensor defines the centre and direction of the array, the sampler, the
+    clipping distances and the medium; field of view and film are those of the views. The pixel filter is a box,
+    so a sample is the mean over its pixel; each view has its own seed. A scene without an integrator is
+    rendered by path tracing.
 
     Args:
-        scene: an XML file, or a dict as `mitsuba.load_dict` takes it, in which NumPy arrays may stand for
-            transforms (``"to_world"``, ``"to_uv"``: 4×4) and for pictures (``"bitmap"``).
-        samples: paths per pixel; samplers that need a certain number round it up (`samples` then says so).
-        variant: of Mitsuba. ``"auto"`` takes the one that is set in this process, or else ``"llvm_ad_rgb"`` where
-            it works and ``"scalar_rgb"`` where it does not, with a warning.
-        seed: of the random numbers: the same gives the same pictures, another one other noise.
-        metres_per_unit: how long a unit of the scene is, metres.
-        to_world: 4×4, where the middle of the array stands in the scene and how it is turned, in Mitsuba's way
-            (the camera looks along its +z, y points up and x to the left). None takes that of the scene's sensor.
-        sensor: which of the scene's sensors to take it from.
+        scene: an XML file, or a dict for `mitsuba.load_dict`, in which NumPy arrays may be used for transforms
+            (``"to_world"``, ``"to_uv"``: 4×4) and for pictures (``"bitmap"``).
+        samples: paths per pixel; some samplers round the number up (see the attribute `samples`).
+        variant: variant of Mitsuba. ``"auto"`` uses the one set in this process, else ``"llvm_ad_rgb"`` if it
+            works, else ``"scalar_rgb"`` with a warning.
+        seed: seed of the random numbers: equal seeds give equal images.
+        metres_per_unit: length of the scene's unit, metres.
+        to_world: 4×4 pose of the array's centre in the scene, in Mitsuba's convention (the camera looks along
+            its +z, y points up and x to the left). None uses the pose of the scene's sensor.
+        sensor: index of the scene's sensor to use.
         parameters: values for the ``$names`` of an XML file.
 
     Raises:
@@ -190,7 +190,7 @@ class MitsubaRenderer:
                 self._to_world = _pose(to_world)
 
     def _sensor(self, number: int, optional: bool) -> Any:
-        """The scene's own sensor, or None where it has none and none is needed."""
+        """The scene's own sensor; None if it has none and none is needed."""
         sensors = self._scene.sensors()
         if number < len(sensors):
             return sensors[number]
@@ -202,7 +202,7 @@ class MitsubaRenderer:
         )
 
     def description(self) -> dict[str, Any]:
-        """All that a picture depends on except the camera; the scene's files by their SHA-256."""
+        """Everything that an image depends on except the camera; the scene's files by their SHA-256."""
         return {
             "name": "mitsuba",
             "version": mitsuba_library().__version__,
@@ -215,12 +215,12 @@ class MitsubaRenderer:
         }
 
     def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        """The picture that a camera takes: linear radiance, shape (rows, columns, 3).
+        """Render the image of a camera: linear radiance, shape (rows, columns, 3).
 
         Raises:
             InputError: pixels that are not square, or a failure of Mitsuba.
         """
-        # The same view has the same noise whatever else is rendered; 2^32 seeds, spread by a prime.
+        # A view has the same noise whatever else is rendered; 2^32 seeds, spread by a prime.
         seed = (self._seed * 1_000_003 + camera.row * 65_537 + camera.column) % 2**32
         with _variant(self.variant) as mitsuba:
             sensor = mitsuba.load_dict(self.sensor_for(camera))
@@ -233,12 +233,12 @@ class MitsubaRenderer:
                 raise InputError(f"Mitsuba: {error}") from error
 
     def sensor_for(self, camera: ViewCamera) -> dict[str, Any]:
-        """The sensor of a view, as `mitsuba.load_dict` takes it.
+        """The sensor of a view, as a dict for `mitsuba.load_dict`.
 
-        Mitsuba shifts a picture by its principal point, in widths to the right and in heights downwards.
+        Mitsuba shifts an image by its principal point, in widths to the right and in heights downwards.
 
         Raises:
-            InputError: pixels that are not square: Mitsuba has no others.
+            InputError: pixels that are not square, which Mitsuba does not support.
         """
         rows, columns = camera.pixels
         wide, high = camera.right - camera.left, camera.bottom - camera.top
@@ -247,7 +247,7 @@ class MitsubaRenderer:
                 f"Mitsuba's pixels are square, and these span {wide / columns:g} across and {high / rows:g} down: "
                 "give one slope_per_pixel for both"
             )
-        # Mitsuba's x points left and its y up.
+        # Mitsuba's x axis points left and its y axis up.
         move = np.eye(4)
         move[:2, 3] = -camera.x / self._metres_per_unit, -camera.y / self._metres_per_unit
         mitsuba = mitsuba_library()
@@ -277,9 +277,9 @@ class MitsubaRenderer:
 
 
 def _settled(mitsuba: Any, sampler: Any, samples: int) -> int:
-    """How many samples a sampler takes when asked for so many."""
+    """The number of samples that a sampler uses if this number is requested."""
     level = mitsuba.log_level()
-    mitsuba.set_log_level(mitsuba.LogLevel.Error)  # it would warn that it rounds, at every view
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)  # it would warn about rounding at every view
     try:
         sampler.set_sample_count(samples)
         return int(sampler.sample_count())
@@ -290,17 +290,17 @@ def _settled(mitsuba: Any, sampler: Any, samples: int) -> int:
 def _pose(to_world: ArrayLike) -> NDArray[np.float64]:
     matrix = checks.array("to_world", to_world, "a 4×4 matrix of numbers", 4, 4)
     turn = matrix[:3, :3]
-    # Single precision is all that Mitsuba keeps of a matrix.
+    # Mitsuba stores matrices in single precision.
     if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-5) or not np.allclose(matrix[3], (0, 0, 0, 1)):
         raise InputError("to_world moves and turns, and must not scale: say how long a unit is by metres_per_unit")
     return matrix
 
 
 def _loaded(mitsuba: Any, scene: Any, parameters: dict[str, str]) -> Any:
-    """The scene, loaded.
+    """Load the scene.
 
     Raises:
-        InputError: Mitsuba refuses it.
+        InputError: Mitsuba cannot load the scene.
     """
     try:
         if isinstance(scene, Mapping):
@@ -312,7 +312,7 @@ def _loaded(mitsuba: Any, scene: Any, parameters: dict[str, str]) -> Any:
 
 
 def for_mitsuba(mitsuba: Any, plugin: Mapping[str, Any]) -> dict[str, Any]:
-    """A scene with Mitsuba's objects for NumPy's arrays: matrices of transforms, and pictures."""
+    """Replace NumPy arrays in a scene by objects of Mitsuba: matrices of transforms, and pictures."""
     made: dict[str, Any] = {}
     for name, value in plugin.items():
         if isinstance(value, Mapping):
@@ -327,10 +327,10 @@ def for_mitsuba(mitsuba: Any, plugin: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _contents(scene: Any, parameters: dict[str, str]) -> dict[str, Any]:
-    """What tells one scene from another: the SHA-256 of a dict, or of an XML file and of all files that it names.
+    """Identity of a scene: the SHA-256 of a dict, or of an XML file and of all files that it names.
 
     Raises:
-        InputError: there is no such file, or it is no XML.
+        InputError: no such file, or not XML.
     """
     if isinstance(scene, Mapping):
         if parameters:
@@ -347,14 +347,14 @@ def _contents(scene: Any, parameters: dict[str, str]) -> dict[str, Any]:
 def _collect(
     path: Path, folder: Path, names: dict[str, str], files: dict[str, str], including: tuple[Path, ...] = ()
 ) -> None:
-    """Add the SHA-256 of a scene file and of all that it names, by their paths from its folder.
+    """Add the SHA-256 of a scene file and of all files that it names, by paths relative to the scene's folder.
 
     Args:
-        path: of the scene file.
-        folder: of the scene.
-        names: values of $names; those that it states are added.
-        files: to add to.
-        including: the files by which it is included.
+        path: path of the scene file.
+        folder: folder of the scene.
+        names: values of $names; values defined in the file are added.
+        files: the dict to extend.
+        including: the chain of files that include this one.
     """
     if path in including:
         raise InputError(f"{path} includes itself")
@@ -373,13 +373,13 @@ def _collect(
         named = element.get("filename") if element.tag == "include" else element.get("value")
         if element.tag not in ("include", "string") or named is None:
             continue
-        # Longest first, as $name2 is not $name followed by a 2.
+        # Longest first: $name2 is not $name followed by a 2.
         for name in sorted(names, key=len, reverse=True):
             named = named.replace(f"${name}", names[name])
         file = folder / named
         if element.tag == "string" and element.get("name") != "filename":
             continue
-        if not is_file(file):  # Mitsuba may know of another folder, or else says that it is not there
+        if not is_file(file):  # Mitsuba may find it in another folder, or else reports it
             files[named] = "not found beside the scene"
         elif element.tag == "include":
             _collect(file, folder, names, files, (*including, path))
@@ -388,7 +388,7 @@ def _collect(
 
 
 def _plain(value: Any) -> Any:
-    """What stands for an object of a dict in JSON: its numbers if it has any, else what it says of itself."""
+    """JSON form of an object in a scene dict: a hash of its numbers if it has any, else its ``repr``."""
     if isinstance(value, Mapping):
         return dict(value)
     try:

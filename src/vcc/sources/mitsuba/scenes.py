@@ -1,6 +1,6 @@
-"""Small scenes of our own for Mitsuba: its shapes and materials, textures made here, several depths each.
+"""Small demo scenes for Mitsuba: its shapes and materials with procedural textures, at several depths each.
 
-Lengths are metres. The camera stands near the origin, y points up, and the scene lies at z < 0.
+Lengths are metres. The camera is near the origin, y points up, and the scene lies at z < 0.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class DemoScene:
-    """A scene and where the views of it best stand.
+    """A scene and a suitable camera array.
 
     Args:
-        name: what to call it.
-        summary: what is in it and how far away, in a line.
-        scene: for `MitsubaRenderer`.
+        name: name of the scene.
+        summary: content and distances, in one line.
+        scene: scene dict for `MitsubaRenderer`.
         aperture: side of the square that the views fill, metres.
-        field_of_view: that the width of a picture spans, radians.
-        focus_distance: where the views converge, metres.
-        distances: of the nearest and the farthest thing, metres.
+        field_of_view: angle spanned by the width of an image, radians.
+        focus_distance: distance at which the views converge, metres.
+        distances: distances of the nearest and the farthest object, metres.
     """
 
     name: str
@@ -45,11 +45,11 @@ class DemoScene:
     distances: tuple[float, float]
 
     def cameras(self, views: tuple[int, int] = (20, 20), pixels: tuple[int, int] = (500, 500)) -> CameraArray:
-        """The array of cameras that the scene is made for.
+        """The array of cameras for which the scene was designed.
 
         Args:
             views: (rows, columns) of views.
-            pixels: (rows, columns) of a view's pixels.
+            pixels: (rows, columns) of pixels of a view.
         """
         return CameraArray.over_aperture(
             self.aperture, self.field_of_view, views=views, pixels=pixels, focus_distance=self.focus_distance
@@ -57,10 +57,10 @@ class DemoScene:
 
 
 def demo_scene(name: str) -> DemoScene:
-    """One of our scenes: ``"still-life"``, ``"columns"`` or ``"lamps"``.
+    """A demo scene: ``"still-life"``, ``"columns"`` or ``"lamps"``.
 
     Raises:
-        InputError: another name.
+        InputError: an unknown name.
     """
     if name not in SCENES:
         raise InputError(f'there is no scene "{name}"; there are {", ".join(SCENES)}')
@@ -68,7 +68,7 @@ def demo_scene(name: str) -> DemoScene:
 
 
 def still_life() -> DemoScene:
-    """Glass, gold, glossy paint and a chequered globe on a wooden table, under a soft lamp."""
+    """Glass, gold, glossy paint and a chequered globe on a wooden table under a soft lamp."""
     things = {
         "table": _floor(_wood(), 2.6, 0.0, reflectance=0.04, middle=-1.5),
         "wall": _thing("rectangle", (0, 0.9, -2.6), (2.4, 1.4, 1), _matt(_picture(_damask(), smooth=True))),
@@ -94,7 +94,7 @@ def still_life() -> DemoScene:
 
 
 def columns() -> DemoScene:
-    """Two rows of stone columns on a polished chequered floor, a ball of another material on each."""
+    """Two rows of stone columns on a polished chequered floor, each with a ball of another material."""
     balls: list[Plugin] = [
         {"type": "roughconductor", "material": "Cu", "alpha": 0.1},
         {"type": "dielectric", "int_ior": 1.5},
@@ -130,7 +130,7 @@ def columns() -> DemoScene:
 
 
 def lamps() -> DemoScene:
-    """Small lamps in the dark over a glossy floor: out of focus, each is a picture of the aperture."""
+    """Small lamps in the dark over a glossy floor: out of focus, each lamp is an image of the aperture."""
     random = np.random.default_rng(5)
     hues = [(1.0, 0.55, 0.18), (1.0, 0.75, 0.4), (0.95, 0.25, 0.12), (0.25, 0.55, 1.0), (0.4, 1.0, 0.55)]
     things: dict[str, Plugin] = {
@@ -148,7 +148,7 @@ def lamps() -> DemoScene:
         "room": {"type": "constant", "radiance": _rgb((0.03, 0.036, 0.05))},
         "key": _lamp((-0.9, 1.5, -0.3), (0.0, 0.1, -1.4), (0.25, 0.25), (60.0, 54.0, 45.0)),
     }
-    # Most of the light on things is the key lamp's: looked for more often, it leaves less noise.
+    # The key lamp gives most of the light: sampling it more often reduces noise.
     things["key"]["emitter"]["sampling_weight"] = 40.0
     for n in range(22):
         depth = 2.0 + 3.6 * random.random()
@@ -175,7 +175,7 @@ SCENES: dict[str, Callable[[], DemoScene]] = {
     "columns": columns,
     "lamps": lamps,
 }
-"""Our scenes by name."""
+"""The demo scenes by name."""
 
 
 def _scene(things: dict[str, Plugin], eye: Place, target: Place) -> Plugin:
@@ -233,7 +233,7 @@ def _column(foot: Place, radius: float, height: float, material: Plugin) -> Plug
 
 
 def _lamp(place: Place, target: Place, size: tuple[float, float], colour: Colour) -> Plugin:
-    """A rectangle that shines on a target; a rectangle's normal is its z, as a camera's view is."""
+    """A rectangular lamp that faces a target; a rectangle's normal is its z axis, as a camera's direction is."""
     scale = np.diag([*size, 1.0, 1.0])
     return {
         "type": "rectangle",
@@ -252,7 +252,7 @@ def _checks(one: Colour, other: Colour, across: float, down: float) -> Plugin:
 
 
 def _picture(values: NDArray[np.float32], smooth: bool) -> Plugin:
-    """Linear reflectance as it is ("raw": not taken for sRGB)."""
+    """A bitmap of linear reflectance ("raw": not decoded as sRGB)."""
     return {
         "type": "bitmap",
         "bitmap": values,
@@ -262,7 +262,7 @@ def _picture(values: NDArray[np.float32], smooth: bool) -> Plugin:
 
 
 def _at(place: Place, size: Place, *, turn: float = 0.0, tip: float = 0.0) -> NDArray[np.float64]:
-    """Scaled, then tipped about x, then turned about y (degrees), then moved."""
+    """Transform that scales, then tips about x, then turns about y (degrees), then translates."""
     a, b = math.radians(turn), math.radians(tip)
     about_y = np.array([[math.cos(a), 0, math.sin(a)], [0, 1, 0], [-math.sin(a), 0, math.cos(a)]])
     about_x = np.array([[1, 0, 0], [0, math.cos(b), -math.sin(b)], [0, math.sin(b), math.cos(b)]])
@@ -273,7 +273,7 @@ def _at(place: Place, size: Place, *, turn: float = 0.0, tip: float = 0.0) -> ND
 
 
 def looking(eye: Place, target: Place) -> NDArray[np.float64]:
-    """Mitsuba's pose of a camera at a place that looks at another: z ahead, y up, x to the left."""
+    """Pose of a Mitsuba camera at ``eye`` that looks at ``target``: z ahead, y up, x to the left."""
     ahead = np.subtract(target, eye)
     ahead = ahead / np.linalg.norm(ahead)
     left = np.cross((0.0, 1.0, 0.0), ahead)
@@ -294,7 +294,7 @@ def _mixed(share: NDArray[Any], low: Colour, high: Colour) -> NDArray[np.float32
 
 
 def _noise(x: NDArray[Any], y: NDArray[Any], seed: int, octaves: int = 5) -> NDArray[Any]:
-    """Waves in random directions, finer ones weaker, about −1 to 1."""
+    """Waves in random directions with amplitude falling with frequency, about −1 to 1."""
     random = np.random.default_rng(seed)
     total = np.zeros_like(x)
     for octave in range(octaves):
