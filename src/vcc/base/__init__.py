@@ -1,1 +1,1 @@
-"""The vocabulary of everything else: errors, units, affine maps, parameters in words; imports nothing of ours."""
+"""The basis of all packages: errors, units, affine maps, parameters as text; imports no other package here."""

@@ -1,4 +1,4 @@
-"""Affine maps of rays and of sample indices: the whole of linear optics, and every frame."""
+"""Affine maps of rays and of sample indices, for linear optics and frames."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 
 MANY = 2**14
-"""Numbers of points from which on they are mapped without threads."""
+"""Number of points above which they are mapped without threads."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,7 +46,7 @@ class Affine:
             raise InputError(f"an affine map is a 5×5 or 3×3 matrix, not {'×'.join(map(str, matrix.shape))}")
         if not np.isfinite(matrix).all():
             raise InputError(f"an affine map needs finite numbers, not\n{matrix}")
-        # As a list, since plans make very many maps and arrays so small are slow.
+        # As a list, because plans make very many maps, and NumPy is slow for such small arrays.
         if matrix[-1].tolist() != [*[0.0] * (len(matrix) - 1), 1.0]:
             raise InputError(f"the last row of an affine map is 0 … 0 1, not {matrix[-1]}")
         matrix.flags.writeable = False
@@ -64,7 +64,7 @@ class Affine:
 
     @classmethod
     def identity(cls, dimensions: int = 4) -> Affine:
-        """The map that changes nothing, on rays (4 dimensions) or points (2)."""
+        """The identity on rays (4 dimensions) or points (2)."""
         return cls(np.eye(dimensions + 1))
 
     @classmethod
@@ -170,16 +170,16 @@ class Affine:
 
     @property
     def offset(self) -> NDArray[np.float64]:
-        """The n numbers to which the origin goes."""
+        """The image of the origin, n numbers."""
         return self.matrix[:-1, -1]
 
     @property
     def determinant(self) -> float:
-        """The factor by which volumes grow; 1 for every lossless optical element and flight in air."""
+        """The factor by which volumes change; 1 for every lossless optical element and flight in air."""
         return float(np.linalg.det(self.linear))
 
     def is_invertible(self) -> bool:
-        """Whether the map can be undone, judged free of the units of its rows and columns."""
+        """Whether the map is invertible, tested independently of the units of its rows and columns."""
         linear = self.linear
         for axis in (0, 1):
             norms = np.sqrt((linear * linear).sum(axis=axis, keepdims=True))
@@ -189,10 +189,10 @@ class Affine:
         return bool(abs(np.linalg.det(linear)) > 1e-12)
 
     def inverse(self) -> Affine:
-        """The map that undoes this one.
+        """The inverse map.
 
         Raises:
-            InputError: this map cannot be undone.
+            InputError: this map is not invertible.
         """
         if not self.is_invertible():
             raise InputError(f"this affine map has no inverse:\n{self!r}")
@@ -210,11 +210,12 @@ class Affine:
         return Affine(self.matrix @ other.matrix)
 
     def __call__(self, points: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
-        """Rays or points as rows of an array (…, n), mapped."""
+        """Map rays or points, the rows of an array (…, n)."""
         given = np.asarray(points, dtype=np.float64)
         if given.size < MANY:
             return np.asarray(given @ self.linear.T + self.offset)
-        # Threads of BLAS cost more than such narrow products take, and wait for one another on a busy machine.
+        # For such narrow products, threads of BLAS cost more than they save, and wait for one another on a busy
+        # machine.
         mapped = np.einsum("...j,ij->...i", given, self.linear)
         mapped += self.offset
         return np.asarray(mapped)

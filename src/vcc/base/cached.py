@@ -1,7 +1,7 @@
 """Properties that are computed once.
 
 `functools.cached_property` of Python 3.11 holds one lock for all objects of a class while it computes. Threads
-that plan two cameras would wait for each other, and two benches that take turns would wait for ever: one holds the
+that plan two cameras would wait for each other, and two benches that run alternately would deadlock: one holds the
 lock and waits for its turn, the other has its turn and waits for the lock.
 """
 
@@ -16,15 +16,14 @@ Value = TypeVar("Value")
 
 
 def cached(compute: Callable[[Owner], Value]) -> Callable[[Owner], Value]:
-    """Compute a property once for each object, and keep it with the object.
+    """Compute a property once for each object, and store it with the object.
 
-    Written below ``@property``, by which type checkers and the pages of the API know it for one.
+    Written below ``@property``, so that type checkers and the API reference recognise the property.
 
-    Threads that ask for the same object's value at one time may each compute it; all that ask later get one of
-    them.
+    Threads that read the same property concurrently may each compute it; later reads return one of their values.
 
     Args:
-        compute: gives the value; it depends on nothing that changes.
+        compute: returns the value, which must not depend on anything that changes.
     """
     name = compute.__name__
 
@@ -40,7 +39,7 @@ def cached(compute: Callable[[Owner], Value]) -> Callable[[Owner], Value]:
 
 
 def preset(owner: object, **values: Any) -> None:
-    """Give an object values of its cached properties that are known already.
+    """Set values of an object's cached properties that are already known.
 
     Args:
         owner: the object.

@@ -1,7 +1,7 @@
-"""Refusals that many places share: each names the thing, its value and the way out.
+"""Shared checks of arguments: each error names the argument, its value and a solution.
 
-A refusal that says something special is worded where it is made; what is said in many places is said here.
-Numbers of any library count as numbers; truth values and text do not.
+Special errors are written where they are raised; errors that occur in many places are here.
+Numbers of any library are accepted as numbers; booleans and text are not.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from vcc.base.errors import InputError
 Array = NDArray[np.float64]
 
 LONGEST_SHOWN = 60
-"""Characters of what was given instead of an array, to be shown in an error."""
+"""Characters of a value given instead of an array that an error shows."""
 SHORTEST, LONGEST = 1e-12, 1e12
-"""Metres of what a camera can be made of: far below a wavelength and far beyond the Sun. Between them squares of
-lengths, and ratios of these, are numbers that float64 and float32 hold."""
+"""Metres, range of the sizes of a camera: far below a wavelength and far beyond the Sun. Between them, squares of
+lengths, and ratios of these, are representable in float64 and float32."""
 
-# --- words ---
+# --- text ---
 
 
 def one_of(name: str, value: object, choices: Iterable[str]) -> str:
-    """A word out of some, as it is.
+    """Check that a text is one of several choices, and return it.
 
     Args:
-        name: what to call it in an error.
-        value: the word.
-        choices: those that there are.
+        name: of the argument in an error.
+        value: the text.
+        choices: valid ones.
 
     Raises:
-        InputError: another word.
+        InputError: another text.
     """
     words = list(choices)
     if value not in words:
@@ -49,15 +49,15 @@ def one_of(name: str, value: object, choices: Iterable[str]) -> str:
 
 
 def ending(what: str, path: Path, *endings: str) -> str:
-    """The ending of a file's name, in small letters.
+    """The ending of a file's name, in lower case.
 
     Args:
-        what: is written there, for the error, such as "a picture".
+        what: kind of the contents, for the error, such as "a picture".
         path: of the file.
-        endings: that it may have, such as ".png".
+        endings: valid ones, such as ".png".
 
     Raises:
-        InputError: another one.
+        InputError: another ending.
     """
     found = path.suffix.lower()
     if found not in endings:
@@ -65,11 +65,11 @@ def ending(what: str, path: Path, *endings: str) -> str:
     return found
 
 
-# --- whole numbers ---
+# --- integers ---
 
 
 def whole_number(value: object) -> int | None:
-    """A whole number of any library as an int; None for anything else, truth values and 2.0 included."""
+    """An integer of any library as an int; None for anything else, including booleans and 2.0."""
     if isinstance(value, bool | np.bool_):
         return None
     try:
@@ -81,15 +81,15 @@ def whole_number(value: object) -> int | None:
 def whole_number_between(
     name: str, value: object, least: int, most: int | None = None, *, of: str = "", way_out: str = ""
 ) -> int:
-    """A whole number within a range, as an int.
+    """Check an integer within a range, and return it as an int.
 
     Args:
-        name: what to call it in an error.
-        value: the number; truth values and floating-point numbers are none.
-        least: the smallest that it may be.
-        most: the largest; None has none.
+        name: of the argument in an error.
+        value: the number; booleans and floating-point numbers are not valid.
+        least: smallest valid number.
+        most: largest valid number; None for no limit.
         of: what it counts, for the error, such as "rays a pixel".
-        way_out: what to do instead, for the error.
+        way_out: a solution, for the error.
 
     Raises:
         InputError: anything else.
@@ -103,11 +103,11 @@ def whole_number_between(
 
 
 def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
-    """Whole numbers of 1 or more, one for each axis: a shape, how many views.
+    """Check integers of 1 or more, one for each axis: a shape, a number of views.
 
     Args:
-        name: what to call them in an error.
-        value: the numbers; floating-point numbers are none.
+        name: of the argument in an error.
+        value: the numbers; floating-point numbers are not valid.
         axes: what is counted, such as "rows" and "columns".
 
     Raises:
@@ -127,11 +127,11 @@ def counts(name: str, value: Any, *axes: str) -> tuple[int, ...]:
 
 
 def seed(value: object, name: str = "seed") -> int:
-    """A seed of random numbers as an int.
+    """Check a seed of random numbers, and return it as an int.
 
     Args:
-        value: a whole number, 0 or more; truth values and floating-point numbers are none.
-        name: what to call it in an error.
+        value: an integer, 0 or more; booleans and floating-point numbers are not valid.
+        name: of the argument in an error.
 
     Raises:
         InputError: anything else.
@@ -155,16 +155,16 @@ def above_zero(
     infinite: bool = False,
     way_out: str = "",
 ) -> float:
-    """A number greater than 0, as a float.
+    """Check a number greater than 0, and return it as a float.
 
     Args:
-        name: what to call it in an error.
+        name: of the argument in an error.
         value: the number.
-        what: it is, for the error, such as "a share of the picture's mean".
+        what: description, for the error, such as "a share of the picture's mean".
         unit: of the number, for the error, such as "m".
-        most: the largest that it may be.
+        most: largest valid number.
         infinite: whether it may be infinite.
-        way_out: what to do instead, for the error.
+        way_out: a solution, for the error.
 
     Raises:
         InputError: anything else, NaN included.
@@ -181,7 +181,7 @@ def above_zero(
 
 
 def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math.inf, way_out: str = "") -> float:
-    """A finite number of 0 or more, as a float; arguments as for `above_zero`.
+    """Check a finite number of 0 or more, and return it as a float; arguments as for `above_zero`.
 
     Raises:
         InputError: anything else, NaN included.
@@ -196,10 +196,10 @@ def zero_or_more(name: str, value: object, *, unit: str = "", most: float = math
 
 
 def finite(name: str, value: object, of: str = "") -> float:
-    """A finite number, as a float.
+    """Check a finite number, and return it as a float.
 
     Args:
-        name: what to call it in an error.
+        name: of the argument in an error.
         value: the number.
         of: what it counts, for the error, such as "metres".
 
@@ -216,16 +216,16 @@ def finite(name: str, value: object, of: str = "") -> float:
 
 
 def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") -> float:
-    """A number other than 0, which may be infinite, as a float: a focal length, a radius of curvature.
+    """Check a number other than 0, which may be infinite, and return it as a float: a focal length, a radius.
 
     Args:
-        name: what to call it in an error.
+        name: of the argument in an error.
         value: the number.
         unit: of the number, for the error.
-        way_out: what to do instead, for the error.
+        way_out: a solution, for the error.
 
     Raises:
-        InputError: 0, NaN or no number.
+        InputError: 0, NaN or not a number.
     """
     number = _number(name, value)
     if math.isnan(number) and not isinstance(value, float | np.floating):
@@ -239,12 +239,12 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
 
 
 def pair(name: str, value: Any, what: str) -> tuple[float, float]:
-    """Two finite numbers, as floats.
+    """Check two finite numbers, and return them as floats.
 
     Args:
-        name: what to call them in an error.
+        name: of the argument in an error.
         value: the numbers.
-        what: they are, for the error, such as "(x, y) in metres".
+        what: description, for the error, such as "(x, y) in metres".
 
     Raises:
         InputError: anything else.
@@ -262,24 +262,24 @@ def pair(name: str, value: Any, what: str) -> tuple[float, float]:
     return one, other
 
 
-# --- what learns ---
+# --- values with gradients ---
 
 PLAIN = np.ndarray, np.float64, float, int
-"""Types of nearly all that is given, none of which learns."""
+"""The most common types of arguments, none of which carries a gradient."""
 
 
 def plain(name: str, value: object) -> None:
-    """Refuse arrays of other libraries that carry a gradient, which elements would lose without a word.
+    """Raise an error for arrays of other libraries that carry a gradient, which elements would silently drop.
 
-    A tensor of PyTorch that requires a gradient, or what stands for an array while JAX traces a function; alone or
-    in tuples and lists. They are known without these libraries being there.
+    These are PyTorch tensors that require a gradient, and JAX tracers; alone or
+    in tuples and lists. They are detected without importing these libraries.
 
     Args:
-        name: what to call it in an error.
-        value: of any kind.
+        name: of the argument in an error.
+        value: of any type.
 
     Raises:
-        InputError: it is one, or holds one.
+        InputError: it carries a gradient, or contains a value that does.
     """
     if type(value) in PLAIN:
         return
@@ -300,15 +300,15 @@ def plain(name: str, value: object) -> None:
     )
 
 
-# --- sizes of things ---
+# --- sizes ---
 
 
 def sizes(of: str, *, way_out: str = "", **given: float | None) -> None:
-    """Refuse sizes that are neither finite and greater than 0 m nor left out (None).
+    """Check that sizes are None or finite and greater than 0 m.
 
     Args:
-        of: whose, for an error, such as 'lens "L1"'.
-        way_out: what to do instead, for the error.
+        of: owner of the sizes, for an error, such as 'lens "L1"'.
+        way_out: a solution, for the error.
         given: the sizes by their names, metres.
 
     Raises:
@@ -320,10 +320,10 @@ def sizes(of: str, *, way_out: str = "", **given: float | None) -> None:
 
 
 def opening(of: str, width: float | None, height: float | None, diameter: float | None = None) -> None:
-    """Refuse an opening of which parts do not fit: round by a diameter, or rectangular, or none at all.
+    """Check the sizes of an opening: round with a diameter, rectangular, or none at all.
 
     Args:
-        of: whose, for an error.
+        of: owner of the sizes, for an error.
         width: metres.
         height: metres; None makes it square.
         diameter: metres.
@@ -342,17 +342,17 @@ def opening(of: str, width: float | None, height: float | None, diameter: float 
 
 
 def array(name: str, given: object, what: str, *shape: int | None, least: int = 1) -> Array:
-    """Finite numbers as an array of their own, float64, that cannot be written to.
+    """Check finite numbers, and return a read-only copy as a float64 array.
 
     Args:
-        name: what to call them in an error, such as "slopes of the array".
+        name: of the argument in an error, such as "slopes of the array".
         given: the numbers.
-        what: they must be, for the error, such as "numbers (rows, columns)".
-        shape: the lengths of the axes; None for any of ``least`` or more.
-        least: the shortest that such an axis may be.
+        what: description, for the error, such as "numbers (rows, columns)".
+        shape: the lengths of the axes; None for any length of at least ``least``.
+        least: smallest length of such an axis.
 
     Raises:
-        InputError: no array of numbers, another shape, or numbers that are not finite.
+        InputError: not an array of numbers, another shape, or numbers that are not finite.
     """
     plain(name, given)
     try:
@@ -372,10 +372,10 @@ def array(name: str, given: object, what: str, *shape: int | None, least: int = 
 
 
 def all_finite(name: str, values: Array) -> None:
-    """Refuse an array that holds NaN or infinity.
+    """Check that an array contains no NaN or infinity.
 
     Args:
-        name: what to call it in an error.
+        name: of the argument in an error.
         values: of any shape.
 
     Raises:
@@ -387,10 +387,10 @@ def all_finite(name: str, values: Array) -> None:
 
 
 def none_negative(name: str, values: Array) -> None:
-    """Refuse an array of finite numbers that holds one below 0.
+    """Check that an array of finite numbers contains no negative one.
 
     Args:
-        name: what to call it in an error.
+        name: of the argument in an error.
         values: of any shape.
 
     Raises:
@@ -401,18 +401,18 @@ def none_negative(name: str, values: Array) -> None:
         raise InputError(f"{name} must be 0 or more; at index {_place(values == lowest)} there is {lowest:g}")
 
 
-# --- around what may be refused ---
+# --- contexts for errors ---
 
 
 @contextmanager
 def within(place: str) -> Iterator[None]:
-    """Refusals within this name a place, unless they do already: a file, an element.
+    """Add a place, such as a file or an element, to errors raised within, unless they already contain it.
 
     Args:
         place: such as ``'camera.toml: element 2'``.
 
     Raises:
-        InputError: what is raised within, with the place before it.
+        InputError: as raised within, with the place in front.
     """
     try:
         yield
@@ -423,16 +423,16 @@ def within(place: str) -> Iterator[None]:
 
 @contextmanager
 def package(doing: str, name: str, extra: str, way_out: str = "") -> Iterator[None]:
-    """Imports of optional packages stand within this, which says how to install them.
+    """Context for imports of optional packages; its error shows how to install them.
 
     Args:
-        doing: what needs it, such as "reading meshes".
+        doing: the purpose, such as "reading meshes".
         name: of the package, as it is installed.
-        extra: of this package that brings it.
-        way_out: what to do without, for the error.
+        extra: of this package that installs it.
+        way_out: a solution without the package, for the error.
 
     Raises:
-        InputError: it is not installed, or does not load.
+        InputError: it is not installed, or cannot be loaded.
     """
     try:
         yield
@@ -444,14 +444,14 @@ def package(doing: str, name: str, extra: str, way_out: str = "") -> Iterator[No
         ) from error
 
 
-# --- words of refusals ---
+# --- text of errors ---
 
 
 def instead(value: object) -> str:
-    """What to write instead of a quantity that is no plain number, for a refusal; empty for anything else.
+    """The expression to write instead of a quantity that is not a plain number, for an error; empty for others.
 
-    Lengths are numbers of metres, and text with a unit is for camera files and the command line: with both here,
-    each class of each user would have to read both.
+    Lengths are numbers of metres, and text with a unit is for camera files and the command line: if both were
+    accepted here, every user-defined class would have to support both.
 
     Args:
         value: text, such as "50 mm"; a quantity of pint or astropy.
@@ -468,7 +468,7 @@ def instead(value: object) -> str:
 
 
 def _number(name: str, value: Any) -> float:
-    """A number as a float; NaN for truth values, text and whatever else is none; what learns is refused."""
+    """A number as a float; NaN for booleans, text and other objects; values with gradients raise an error."""
     plain(name, value)
     if isinstance(value, bool | np.bool_ | str | bytes):
         return math.nan
@@ -479,7 +479,7 @@ def _number(name: str, value: Any) -> float:
 
 
 def _check_length(name: str, number: float, *, no_shorter: bool = True, no_longer: bool = True) -> None:
-    """Refuse lengths that only slips have, such as "1e300 m"; computing with them ends in overflows."""
+    """Raise an error for lengths that only occur by mistake, such as "1e300 m"; they would cause overflows."""
     if (no_shorter and abs(number) < SHORTEST) or (no_longer and abs(number) > LONGEST):
         raise InputError(
             f"{name} is {number:g} m, which no camera has: it is computed with lengths from {SHORTEST:g} m to "

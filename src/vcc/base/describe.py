@@ -1,4 +1,4 @@
-"""Parameters of frozen dataclasses in words, with the units that their fields state."""
+"""Parameters of frozen dataclasses as text, with the units given in their fields."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from vcc.base.units import short
 
 LONGEST_LIST = 6
-"""Of more numbers than this only how many they are and their range are told."""
+"""Longest list of numbers that is written out; of longer ones, the number and the range are written."""
 
 
 def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
     """The parameters of a dataclass that differ from their defaults, such as ``"diameter 20 mm"``.
 
-    Numbers are rounded to 6 digits; of arrays and long lists the shape and the range are told, of dataclasses in
-    fields their own words (``described()`` where they have it).
+    Numbers are rounded to 6 digits; arrays and long lists are described by shape and range, dataclasses in
+    fields by their own text (``described()`` if they have it).
 
     Args:
         thing: an instance of a dataclass; fields with ``metadata={"unit": ...}`` are written with that unit.
-        leave_out: names of fields to pass over.
+        leave_out: names of fields to skip.
     """
     parts = []
     for parameter in fields(thing):
@@ -33,7 +33,7 @@ def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
         if parameter.name in leave_out or value is None or is_default(value, parameter):
             continue
         name = parameter.name.replace("_", " ")
-        if isinstance(value, bool):  # it stands apart from its default, so that its name says it all
+        if isinstance(value, bool):  # it differs from its default, so its name is enough
             parts.append(name if value else f"not {name}")
         else:
             parts.append(f"{name} {_value(value, parameter.metadata.get('unit'))}")
@@ -41,11 +41,11 @@ def parameters_in_words(thing: Any, leave_out: tuple[str, ...] = ()) -> str:
 
 
 def parameters_listed(thing: Any, leave_out: tuple[str, ...] = ()) -> list[tuple[str, str]]:
-    """All parameters of a dataclass that are given, defaults too: (name, value with its unit), in words.
+    """All parameters of a dataclass that are not empty, defaults too: (name, value with its unit), as text.
 
     Args:
         thing: as for `parameters_in_words`.
-        leave_out: names of fields to pass over.
+        leave_out: names of fields to skip.
     """
     listed = []
     for parameter in fields(thing):
@@ -59,7 +59,7 @@ def parameters_listed(thing: Any, leave_out: tuple[str, ...] = ()) -> list[tuple
 
 
 class Brief:
-    """A base of dataclasses (``repr=False``) whose arrays and long lists are told by shape and range."""
+    """Base of dataclasses (``repr=False``) whose arrays and long lists are described by shape and range."""
 
     def __repr__(self) -> str:
         shown = (part for part in fields(self) if part.repr)  # type: ignore[arg-type]
@@ -68,16 +68,16 @@ class Brief:
 
 
 def in_brief(value: Any) -> str:
-    """A value as Python shows it, but for arrays and long lists, of which shape, type and range are told.
+    """The repr of a value, with arrays and long lists described by shape, type and range.
 
     Args:
-        value: of any type. Arrays of any library are known by their ``shape`` and ``dtype``.
+        value: of any type. Arrays of any library are recognised by their ``shape`` and ``dtype``.
     """
     shape, kind = getattr(value, "shape", None), getattr(value, "dtype", None)
     if isinstance(value, np.ndarray) and value.ndim:
         low_high = ""
         if value.size and value.dtype.kind in "biuf":
-            # A quick look does not go through gigabytes.
+            # The range of arrays of gigabytes would take too long.
             low_high = f" from {value.min():.4g} to {value.max():.4g}" if value.size <= 10**7 else ""
         return f"<{'×'.join(map(str, value.shape))} {value.dtype}{low_high}>"
     if isinstance(shape, tuple) and kind is not None and shape:
@@ -94,26 +94,26 @@ def in_brief(value: Any) -> str:
             return f"<dictionary of {len(value)}>"
         return "{" + ", ".join(f"{key!r}: {in_brief(each)}" for key, each in value.items()) + "}"
     text = repr(value)
-    return text if "\n" not in text else f"<{type(value).__name__}>"  # a table of its own has no room in a line
+    return text if "\n" not in text else f"<{type(value).__name__}>"  # a multi-line repr does not fit
 
 
 def kind_in_words(kind: type, gap: str = " ") -> str:
-    """The name of a class in small letters: ``"lens array"`` for LensArray.
+    """The name of a class in lower case: ``"lens array"`` for LensArray.
 
     Args:
         kind: the class.
-        gap: what stands between its words.
+        gap: separator of its words.
     """
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", gap, kind.__name__).lower()
 
 
 def instead_of_name(given: str | type, module: str, kinds: Iterable[type]) -> str:
-    """What to write where a name, as camera files have it, or a class stands for a thing, for a refusal.
+    """The expression to write instead of a name, as in camera files, or a class, for an error.
 
     Args:
         given: such as "circle", or the class itself.
         module: where users find them, such as "vcc.patterns".
-        kinds: the dataclasses that there are.
+        kinds: the existing dataclasses.
     """
     by_name = {kind.__name__.lower(): kind for kind in kinds}
     said = given.__name__ if isinstance(given, type) else given
@@ -126,12 +126,12 @@ def instead_of_name(given: str | type, module: str, kinds: Iterable[type]) -> st
 
 
 def with_parameters(name: str, parameters: str) -> str:
-    """A name, and parameters in brackets if there are any: ``"circle (diameter 3 mm)"``."""
+    """A name, with parameters in brackets if there are any: ``"circle (diameter 3 mm)"``."""
     return f"{name} ({parameters})" if parameters else name
 
 
 def is_default(value: Any, parameter: Field[Any]) -> bool:
-    """Whether a field of a dataclass has its default value; values may be arrays, or hold some.
+    """Whether a field of a dataclass has its default value; values may be arrays, or contain arrays.
 
     Args:
         value: of the field.
@@ -147,7 +147,7 @@ def is_default(value: Any, parameter: Field[Any]) -> bool:
         return isinstance(value, np.ndarray) and isinstance(default, np.ndarray) and np.array_equal(value, default)
     try:
         return bool(value == default)
-    except (ValueError, TypeError):  # arrays inside, of which == makes an array
+    except (ValueError, TypeError):  # arrays inside, for which == returns an array
         return False
 
 
@@ -165,7 +165,7 @@ def _value(value: Any, unit: str | None) -> str:
         return str(described())
     if is_dataclass(value) and not isinstance(value, type):
         return with_parameters(type(value).__name__, parameters_in_words(value))
-    # A function has a name; what has neither that nor words of its own may print itself at any length.
+    # A function has a name; other objects without a name or a description may have a repr of any length.
     return str(getattr(value, "__name__", None) or (value if isinstance(value, str) else type(value).__name__))
 
 
@@ -188,7 +188,7 @@ def _list(values: tuple[Any, ...] | list[Any], unit: str | None) -> str:
 
 
 def _array(values: NDArray[Any], unit: str | None) -> str:
-    """The shape, and from where to where the numbers lie."""
+    """The shape and the range of numbers."""
     what = f"{'×'.join(map(str, values.shape))} numbers" if values.ndim > 1 else f"{values.size} numbers"
     if values.size == 0 or values.dtype.kind not in "biuf":
         return what

@@ -1,29 +1,29 @@
-"""What goes wrong, as types: one error for bad input, one warning for a result to be read with care."""
+"""Types of errors and warnings: one error for bad input, one warning for results to be read with care."""
 
 import inspect
 import warnings
 
 
 class InputError(ValueError):
-    """Something given to the camera, a light field or a file reader is unusable.
+    """An argument of the camera, a light field or a file reader is unusable.
 
-    The message names the thing, its value and the way out.
+    The message names the argument, its value and a solution.
     """
 
 
 class ResultWarning(UserWarning):
-    """A result was made, but part of what was asked for was not there (rays, orientation, units)."""
+    """A result is complete except for missing input (rays, orientation, units)."""
 
 
 class CacheWarning(UserWarning):
-    """Something could not be kept to be used again: results are the same, and take longer the next time."""
+    """A result could not be cached: later results are the same, but take longer."""
 
 
 def warn_of_result(message: str) -> None:
-    """Warn of a result, at the line that called this package, however far inside it this is noticed.
+    """Warn about a result; the warning refers to the line that called this package.
 
     Args:
-        message: what is to be known of the result, and the way out.
+        message: description of the problem, and a solution.
 
     Warns:
         ResultWarning: always.

@@ -1,4 +1,4 @@
-"""Hints for names that do not exist: what a user probably meant."""
+"""Hints for names that do not exist: suggestions of the intended name."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, NoReturn
 
 
 def no_such_name(module: str, name: str, known: Iterable[str], instead: Mapping[str, str]) -> AttributeError:
-    """The error of a module without an attribute, with the names that come closest.
+    """The error for a missing attribute of a module, with the closest names.
 
     Args:
         module: its full name.
         name: of the attribute.
         known: all public names of the module.
-        instead: other words, in lower case, and what to write for each.
+        instead: other names, in lower case, and the replacement of each.
     """
     words = f"module {module!r} has no attribute {name!r}"
     written = instead.get(name.lower())
@@ -27,10 +27,10 @@ def no_such_name(module: str, name: str, known: Iterable[str], instead: Mapping[
 
 
 class NoSuchMember:
-    """A class attribute that does not exist: raises `AttributeError` that says what to write.
+    """A class attribute that does not exist: raises `AttributeError` with its replacement.
 
     Args:
-        instead: what to write.
+        instead: the replacement.
     """
 
     def __init__(self, instead: str) -> None:

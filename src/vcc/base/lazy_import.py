@@ -1,4 +1,4 @@
-"""Modules loaded by name when they are first needed: what is compiled takes a second to load."""
+"""Modules imported by name on first use: compiled ones take a second to load."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from typing import Any
 
 
 def module(name: str) -> Any:
-    """A module of ours by its full name; the names stand in strings, where the tests of imports find them."""
+    """Import a module of this package by its full name; names are literal strings, which the import tests find."""
     return import_module(name)

@@ -1,4 +1,4 @@
-"""Numbers between the points of a grid."""
+"""Interpolation between the points of a grid."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def bilinear(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[Any]:
-    """What stands between the points of a grid, linear along rows and along columns.
+    """Values between the points of a grid, linear along rows and along columns.
 
     Args:
-        values: at whole numbers of rows and columns, shape (rows, columns, ...): one number or several at a point.
-            Several are looked up fastest where each is a plane in memory (`numpy.moveaxis` of planes).
-        row: places in numbers of rows, fractions between them; broadcast with ``column`` to a shape S.
-        column: likewise in numbers of columns. Beyond the outermost points values stay as they are there.
+        values: at integer rows and columns, shape (rows, columns, ...): one number or several at a point.
+            Several are interpolated fastest if each is contiguous in memory (`numpy.moveaxis` of planes).
+        row: places as fractional rows; broadcast with ``column`` to a shape S.
+        column: likewise as fractional columns. Beyond the outermost points, values are constant.
 
     Returns:
         Shape (*S, ...): float32 for values of float32 and small integers, else float64.
@@ -35,20 +35,20 @@ def bilinear(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray
 def three_around(
     place: ArrayLike, points: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float64], NDArray[np.float64]]:
-    """The three points of a line that a quadratic B-spline takes at a place, zeros beyond the line's ends.
+    """The three points of a line that a quadratic B-spline uses at a place, with zeros beyond the line's ends.
 
-    With c the point nearest to a place p and f = p − c, the points c − 1, c, c + 1 count ½(½ − f)², ¾ − f²,
-    ½(½ + f)²: their sum is 1, and what is looked up has a continuous slope.
+    With c the point nearest to a place p and f = p − c, the points c − 1, c, c + 1 have the weights ½(½ − f)²,
+    ¾ − f², ½(½ + f)²: their sum is 1, and the interpolated value has a continuous slope.
 
     Args:
-        place: in numbers of points, shape S.
-        points: how many the line has.
+        place: as a fractional number of points, shape S.
+        points: number of points of the line.
 
     Returns:
-        Which points, what each counts, and the derivative of that to the place, each of shape (3, ...S). A point
-        that is not there is one that is, and counts nothing.
+        The points, their weights, and the derivatives of the weights to the place, each of shape (3, ...S). Points
+        beyond the ends are replaced by existing ones with weight 0.
     """
-    held = np.clip(np.asarray(place, dtype=np.float64), -2.0, points + 1.0)  # further out is as dark
+    held = np.clip(np.asarray(place, dtype=np.float64), -2.0, points + 1.0)  # further out, the result is 0, too
     middle = np.floor(held + 0.5)
     f = held - middle
     point = middle.astype(np.intp) + np.arange(-1, 2).reshape(3, *(1,) * f.ndim)
@@ -59,12 +59,12 @@ def three_around(
 
 
 def smooth(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
-    """What stands between the points of a grid by quadratic B-splines, zeros around it; see `three_around`.
+    """Values between the points of a grid by quadratic B-splines, with zeros around it; see `three_around`.
 
     Args:
-        values: (rows, columns). Splines do not pass through them: what they take is given back beforehand.
-        row: places in numbers of rows; broadcast with ``column`` to a shape S.
-        column: likewise in numbers of columns.
+        values: (rows, columns). The splines do not pass through them: their blur is compensated beforehand.
+        row: places as fractional rows; broadcast with ``column`` to a shape S.
+        column: likewise as fractional columns.
 
     Returns:
         Shape S.
@@ -78,7 +78,7 @@ def smooth(values: NDArray[Any], row: ArrayLike, column: ArrayLike) -> NDArray[n
 def smooth_back(
     values: NDArray[Any], row: ArrayLike, column: ArrayLike, weights: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """The derivative of Σ weights · `smooth` (values, row, column) to each value, row and column.
+    """The derivatives of Σ weights · `smooth` (values, row, column) to each value, row and column.
 
     Args:
         values: see `smooth`.

@@ -1,4 +1,4 @@
-"""How much memory a piece of work may take, said before it starts."""
+"""Limits of the memory of an operation, checked before it starts."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from collections.abc import Sequence
 from vcc.base.errors import InputError
 
 MEMORY_LIMIT = 4 * 2**30
-"""Bytes that one piece of work may take where nothing else is asked for."""
+"""Default limit of the memory of one operation, bytes."""
 
 
 def check_memory(needed: int, limit: int | None, what: str, way_out: str) -> None:
-    """Refuse work that takes more memory than allowed.
+    """Raise an error for work that takes more memory than allowed.
 
     Args:
         needed: bytes.
-        limit: bytes; None takes `MEMORY_LIMIT`.
-        what: needs them, for the message.
-        way_out: what to do instead, for the message.
+        limit: bytes; None uses `MEMORY_LIMIT`.
+        what: subject of the message.
+        way_out: a solution, for the message.
 
     Raises:
-        InputError: with the bytes needed, the bytes allowed and what to do.
+        InputError: with the bytes needed, the bytes allowed and the solution.
     """
     allowed = MEMORY_LIMIT if limit is None else limit
     if needed > allowed:
@@ -32,13 +32,13 @@ def check_memory(needed: int, limit: int | None, what: str, way_out: str) -> Non
 
 
 def check_samples(shape: Sequence[int], limit: int | None, what: str, way_out: str = "", each: int = 4) -> None:
-    """Refuse samples of a shape that take more memory than allowed.
+    """Raise an error for samples that take more memory than allowed.
 
     Args:
         shape: of the samples.
-        limit: bytes; None takes `MEMORY_LIMIT`.
-        what: they are, for the message.
-        way_out: what to do instead; empty for a part or a coarser grid of a light field.
+        limit: bytes; None uses `MEMORY_LIMIT`.
+        what: name of the samples, for the message.
+        way_out: a solution; empty for a part or a coarser grid of a light field.
         each: bytes of a sample: 4 for float32, 8 for complex64.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Warnings of many pictures, said once for each kind."""
+"""Warnings about many images, issued once for each kind."""
 
 from __future__ import annotations
 
@@ -10,34 +10,34 @@ from contextlib import contextmanager
 from vcc.base.errors import ResultWarning, warn_of_result
 
 MANY_KINDS = 5
-"""Kinds of remarks on pictures that are still passed on."""
+"""Largest number of kinds of warnings that are passed on."""
 
 
 class Notices:
-    """What is remarked on pictures while they are made."""
+    """Warnings collected while images are made."""
 
     def __init__(self) -> None:
         self._kinds, self._first = Counter[str](), dict[str, str]()
 
     def say(self, total: int, of: str) -> None:
-        """Say what was remarked.
+        """Issue the collected warnings.
 
         Args:
-            total: pictures of the whole.
-            of: what they are pictures by, such as "cameras".
+            total: number of images.
+            of: what the images are counted by, such as "cameras".
         """
         for kind, count in self._kinds.most_common(MANY_KINDS):
             share = f"{count} of {total} {of}, one of them: " if total > 1 else ""
             warn_of_result(f"{share}{self._first[kind]}")
 
     def add(self, other: Notices) -> None:
-        """Take note of what was remarked elsewhere."""
+        """Add warnings collected elsewhere."""
         self._kinds += other._kinds
         self._first = {**other._first, **self._first}
 
     @contextmanager
     def gathered(self) -> Iterator[None]:
-        """Take note of what is remarked within."""
+        """Collect the warnings issued within the context."""
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ResultWarning)
             yield

@@ -1,11 +1,11 @@
-"""How long work says how far it is."""
+"""Progress of long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int], None]
-"""Called with (done, total) as work advances; what it raises ends the work."""
+"""Called with (done, total) as work advances; an exception that it raises ends the work."""
 
 
 def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None:
@@ -16,11 +16,11 @@ def part_of(progress: Progress | None, part: int, parts: int) -> Progress | None
 
 
 ENDS_WORK = "ends_work"
-"""The attribute of what `Progress` raised: no fault of what is being worked on."""
+"""Attribute of exceptions raised by `Progress`, which are not errors of the work itself."""
 
 
 def tell(progress: Progress | None, done: int, total: int) -> None:
-    """Say how far work is, where somebody wants to know."""
+    """Call the progress callback, if there is one."""
     if progress is None:
         return
     try:

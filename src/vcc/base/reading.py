@@ -1,7 +1,7 @@
-"""The boundary to files that others wrote: whatever goes wrong while they are read is an `InputError` in words.
+"""Safe reading of files from other sources: every fault of a file becomes an `InputError`.
 
-Every public reader does its reading within `reading`, and what it opens passes `check_file` first: a pipe that
-nobody writes to would be waited for, and a device has no end.
+Every public reader reads within `reading`, and first passes what it opens to `check_file`: reading a pipe
+without a writer would block, and a device has no end.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from vcc.base.errors import InputError
 from vcc.base.progress import ENDS_WORK
 
 LONGEST_MESSAGE = 600
-"""Characters of a refusal: what a file holds is quoted in it, and may have any length."""
+"""Maximum number of characters of an error: it quotes contents of files, which may have any length."""
 MOST_UNPACKED = 2**26
-"""Bytes to which a packed text or picture may unpack, however small it is."""
+"""Bytes to which a packed text or image may always unpack, for any packed size."""
 MOST_TIMES_PACKED = 100
-"""How many times its packed size it may have if it is larger; text and pictures pack 2 to 20 times smaller."""
+"""Largest ratio of unpacked to packed size above that; texts and images usually have 2 to 20."""
 
 _FAULTS_OF_PROGRAMS = (AssertionError, ImportError, NameError)
 
@@ -38,18 +38,19 @@ _SPECIAL = {
 
 @contextmanager
 def reading(path: str | PathLike[str], what: str) -> Iterator[None]:
-    """Reading what others wrote stands within this: anything that it raises becomes a refusal that names the file.
+    """Context for reading files from other sources: any exception becomes an error that names the file.
 
-    What cannot come from a file passes: assertions of ours, names and packages that are not there, warnings that
-    are raised, and what a `Progress` raises. The error that was raised is the ``__cause__`` of the refusal.
+    Exceptions that cannot come from a file are passed on: assertions of this package, missing names and packages,
+    warnings that are raised, and exceptions of a `Progress`. The original exception is the ``__cause__`` of the
+    error.
 
     Args:
         path: the file or folder.
-        what: it is read as, such as "a light field".
+        what: kind of the contents, such as "a light field".
 
     Raises:
-        InputError: as raised within, with the name of the file if that is not in it, at most `LONGEST_MESSAGE`
-            long; or in place of any other exception.
+        InputError: as raised within, with the name of the file added if missing, at most `LONGEST_MESSAGE`
+            long; or instead of any other exception.
     """
     try:
         yield
@@ -69,11 +70,11 @@ def _named(said: str, path: str | PathLike[str]) -> str:
 
 
 def shown(text: str, most: int = LONGEST_MESSAGE) -> str:
-    """A text fit to be shown: characters that steer terminals as their codes, the middle of a long one left out.
+    """A text safe for display: control characters as their codes, the middle of a long text omitted.
 
     Args:
         text: any.
-        most: characters of what is returned.
+        most: maximum number of characters of the result.
     """
 
     def plain(part: str) -> str:
@@ -87,7 +88,7 @@ def shown(text: str, most: int = LONGEST_MESSAGE) -> str:
 
 
 def in_words(error: BaseException) -> str:
-    """What was raised, for people who know nothing of Python."""
+    """An exception as text, for readers without knowledge of Python."""
     said = " ".join(str(error).split())
     if isinstance(error, MemoryError):
         return "it needs more memory than there is" + (f" ({said})" if said else "")
@@ -107,7 +108,7 @@ def expanded(path: str | PathLike[str]) -> Path:
     """A path with ``~`` and ``~user`` replaced.
 
     Raises:
-        InputError: neither text nor a path; there is no such user, or a NUL in it, which no name has.
+        InputError: neither text nor a path; an unknown user, or a NUL character.
     """
     if not isinstance(path, str | PathLike):
         raise InputError(f"the name of a file or folder is text or a pathlib.Path, not a {type(path).__name__}")
@@ -121,11 +122,11 @@ def expanded(path: str | PathLike[str]) -> Path:
 
 
 def check_path(path: Path, what: str) -> bool:
-    """Refuse what is neither a file nor a folder, or is not there.
+    """Check that a path is an existing file or folder.
 
     Args:
         path: any.
-        what: is wanted, such as "picture file".
+        what: expected kind, such as "picture file".
 
     Returns:
         Whether it is a folder.
@@ -148,7 +149,7 @@ def check_path(path: Path, what: str) -> bool:
 
 
 def check_file(path: Path, what: str = "file") -> None:
-    """Refuse what is no file that can be read; as `check_path`.
+    """Check that a path is a readable file; as `check_path`.
 
     Raises:
         InputError: also for a folder.
@@ -158,7 +159,7 @@ def check_file(path: Path, what: str = "file") -> None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; False for what cannot be a path, too."""
+    """Whether there is such a file; False also for invalid paths."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -166,10 +167,10 @@ def is_file(path: Path) -> bool:
 
 
 def read_bytes(path: Path, what: str = "file") -> bytes:
-    """What a file holds.
+    """The contents of a file.
 
     Raises:
-        InputError: as `check_file`; or the disk refuses.
+        InputError: as `check_file`; or an error of the disk.
     """
     check_file(path, what)
     with reading(path, f"a {what}"):
@@ -177,7 +178,7 @@ def read_bytes(path: Path, what: str = "file") -> bytes:
 
 
 def read_text(path: Path, what: str = "text file") -> str:
-    """What a file in UTF-8 holds, a byte order mark taken off.
+    """The contents of a file in UTF-8, without a byte order mark.
 
     Raises:
         InputError: as `read_bytes`; or it is not UTF-8.
@@ -188,14 +189,14 @@ def read_text(path: Path, what: str = "text file") -> str:
 
 
 def read_json(data: bytes, name: str) -> dict[str, Any]:
-    """The object in a text of JSON.
+    """The object in a JSON text.
 
     Args:
         data: the text.
         name: of the file, or of its part, for an error.
 
     Raises:
-        InputError: it is no JSON, nested too deeply, or no object.
+        InputError: it is not JSON, nested too deeply, or not an object.
     """
     try:
         found = json.loads(data.decode("utf-8"))
@@ -208,22 +209,22 @@ def read_json(data: bytes, name: str) -> dict[str, Any]:
 
 
 def value_at(tree: Any, *keys: str) -> Any:
-    """What stands in a tree of JSON under these keys; None if nothing does."""
+    """The value at a path of keys in a JSON tree; None if there is none."""
     for key in keys:
         tree = tree.get(key) if isinstance(tree, dict) else None
     return tree
 
 
 def most_unpacked(packed: int) -> int:
-    """Bytes to which a text or a picture of so many packed bytes may unpack; arrays may to more."""
+    """Bytes to which a text or an image of this packed size may unpack; arrays may be larger."""
     return max(MOST_UNPACKED, MOST_TIMES_PACKED * packed)
 
 
 def unpacked_gzip(path: Path, what: str = "file") -> bytes:
-    """What a file of gzip holds.
+    """The contents of a gzip file.
 
     Raises:
-        InputError: as `read_bytes`; it is damaged, or unpacks to more than `most_unpacked` says.
+        InputError: as `read_bytes`; it is damaged, or unpacks to more than `most_unpacked` allows.
     """
     check_file(path, what)
     most = most_unpacked(path.stat().st_size)

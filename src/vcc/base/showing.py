@@ -1,7 +1,7 @@
-"""How a thing shows itself at the end of a notebook's cell: it asks, and a room far above answers.
+"""Display of objects at the end of a notebook's cell, with the renderer registered by `vcc`.
 
-Things are data and stand low; drawings stand higher. So a thing knows only that somebody makes an exhibit of it,
-and `vcc` itself, which stands above all, says who (`answered_by`): loaded when the first cell ends with a thing.
+Data classes must not import drawings, which are in higher packages. So this module only calls a function that
+returns an exhibit of an object; `vcc` registers it (`answered_by`), and it is imported on first use.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from typing import Any, Protocol
 
 
 class Exhibit(Protocol):
-    """What is shown of a thing."""
+    """Representations of an object."""
 
     @property
     def html(self) -> str:
-        """All of it: pictures, tables, words. No scripts, nothing from elsewhere."""
+        """The whole exhibit: images, tables, text. No scripts, no external resources."""
         ...
 
     @property
     def png(self) -> bytes | None:
-        """The picture in it, or the first of them, as a PNG file; None where there is none."""
+        """The first image of the exhibit as a PNG file; None if there is none."""
         ...
 
 
@@ -29,16 +29,16 @@ _answers: list[Callable[[Any], Exhibit]] = []
 
 
 def answered_by(exhibit: Callable[[Any], Exhibit]) -> None:
-    """Say who makes exhibits of things; called once, by `vcc` itself.
+    """Register the function that makes exhibits of objects; called once, by `vcc` itself.
 
     Args:
-        exhibit: takes a thing.
+        exhibit: returns the exhibit of an object.
     """
     _answers[:] = [exhibit]
 
 
 class Shown:
-    """A base of what shows itself in Jupyter, VS Code and marimo: as HTML, with its picture as PNG beside it."""
+    """Base class of objects that Jupyter, VS Code and marimo display: as HTML, and their image as PNG."""
 
     __slots__ = ()
 
@@ -64,6 +64,6 @@ class Shown:
 
 
 def spread(count: int, most: int) -> list[int]:
-    """Up to so many of some things, from the first to the last, in steps as even as can be."""
+    """At most ``most`` indices of ``count`` items, from the first to the last, evenly spaced."""
     some = min(count, most)
     return [round(n * (count - 1) / max(some - 1, 1)) for n in range(some)]

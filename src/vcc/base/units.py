@@ -1,7 +1,7 @@
-"""Units as plain factors to SI, so that code reads ``Lens(focal_length=50 * mm)``.
+"""Units as plain factors to SI, for code such as ``Lens(focal_length=50 * mm)``.
 
-Everything inside this library is in metres, radians and seconds; slopes are dimensionless.
-``parse`` reads a quantity with its unit, as camera files and the command line carry it.
+This library uses metres, radians and seconds; slopes are dimensionless.
+``parse`` reads a quantity with its unit, as written in camera files and on the command line.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
     "time": ("s", "ms", "us"),
 }
 _CLEARLY: Final = 4
-"""Letters by which a number must be shorter to be written in another unit than that in which it reads best."""
+"""Number of characters that another unit must save to be used instead of the most readable one."""
 _LONGEST_SHOWN: Final = 60
-"""Characters of what was given instead of a quantity, to be shown in an error."""
+"""Characters of an invalid quantity that an error shows."""
 SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
 _EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
 _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
@@ -52,10 +52,10 @@ _IN_PYTHON: Final = {"µm": "um", "μm": "um", "µs": "us", "μs": "us", "°": "
 
 
 def as_python(text: str) -> str | None:
-    """A quantity or a number in text as one writes it in Python, ``"50 * mm"`` for "50 mm"; None for other text.
+    """A quantity or a number in text as a Python expression, ``"50 * mm"`` for "50 mm"; None for other text.
 
     Args:
-        text: as camera files and the command line have it.
+        text: as in camera files and on the command line.
     """
     match = _QUANTITY.fullmatch(text.strip())
     if match is None:
@@ -69,7 +69,7 @@ def as_python(text: str) -> str | None:
 
 @functools.cache
 def _registry() -> Any:
-    import pint  # 0.3 s to import: only those who write uncommon units pay for it
+    import pint  # 0.3 s to import: only needed for uncommon units
 
     return pint.UnitRegistry()
 
@@ -77,12 +77,12 @@ def _registry() -> Any:
 def parse(text: object, dimension: str, what: str) -> float:
     """The SI value of a quantity written with its unit, such as ``"50 mm"``.
 
-    Units are those of this module and all that pint knows by name (``"2 inch"``, ``"30 arcmin"``).
+    Units are those of this module and all names that pint supports (``"2 inch"``, ``"30 arcmin"``).
 
     Args:
         text: the quantity, a string with a number and a unit.
         dimension: ``"length"`` (metres), ``"angle"`` (radians) or ``"time"`` (seconds).
-        what: how to name the quantity in an error, such as ``'focal_length of lens "L1"'``.
+        what: name of the quantity in an error, such as ``'focal_length of lens "L1"'``.
 
     Raises:
         InputError: not a string, no unit, an unknown unit, or a unit of another dimension.
@@ -109,11 +109,11 @@ def _cut(words: str) -> str:
 
 
 def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
-    """The factor to SI of a unit that this module does not define itself."""
+    """The factor to SI of a unit that is not defined in this module."""
     kind, example = f"{_article(dimension)} {dimension}", _EXAMPLES[dimension]
     if len(unit) > _LONGEST_SHOWN:
         raise InputError(f'{what}, which is not {kind}; write it like "{example}"')
-    if not _UNIT_NAME.fullmatch(unit):  # pint would take it for arithmetic
+    if not _UNIT_NAME.fullmatch(unit):  # pint would evaluate it as arithmetic
         raise InputError(f'{what}, and "{unit}" is not a unit of {dimension}; write {kind} like "{example}"')
     import pint
 
@@ -126,13 +126,13 @@ def _factor_by_pint(unit: str, dimension: str, what: str) -> float:
 
 
 def text(value: float, dimension: str = "length", *, exact: bool = False) -> str:
-    """A value in SI, written with the unit in which it reads best, such as ``"50 mm"``.
+    """A value in SI, written with the most readable unit, such as ``"50 mm"``.
 
     Args:
         value: metres, radians or seconds.
         dimension: ``"length"``, ``"angle"`` or ``"time"``.
-        exact: whether ``parse(text(value, dimension, exact=True), dimension, "")`` must give the same
-            float back, bit by bit, as files need it; else 15 digits do, which hide rounding.
+        exact: whether ``parse(text(value, dimension, exact=True), dimension, "")`` must return the same
+            float, bit by bit, as required for files; otherwise 15 digits, which hide rounding.
     """
     names = _WRITTEN[dimension]
     value = float(value) + 0.0  # -0 is 0
@@ -140,26 +140,26 @@ def text(value: float, dimension: str = "length", *, exact: bool = False) -> str
         return f"{value:g} {names[0]}"
     best = _best_unit(value, names, dimension)
     ordered = [best, *(name for name in names if name != best)]
-    if dimension == "angle":  # the shortest is the one that was meant: 45 deg, 0.2 rad
+    if dimension == "angle":  # the shortest is the intended one: 45 deg, 0.2 rad
         ordered.sort(key=lambda name: len(_written(value, name, dimension, 15)))
     if not exact:
         return _written(value, ordered[0], dimension, 15)
-    # In SI the factor is 1, and 17 digits always give the float back.
+    # In SI the factor is 1, and 17 digits always reproduce the float.
     candidates = [_written(value, name, dimension, n) for n in (15, 17) for name in ordered]
     faithful = [each for each in candidates if parse(each, dimension, "it") == value]
     short = [each for each in faithful if "e" not in each]
     if faithful[0] == candidates[0]:
         return faithful[0]
-    # Another unit only where it is clearly shorter: 0.04 mm for 40e-6, but no millions of nanometres.
+    # Another unit only if it is clearly shorter: 0.04 mm for 40e-6, but not millions of nanometres.
     return min(short or faithful, key=lambda each: len(each) + _CLEARLY * (each.split()[1] != ordered[0]))
 
 
 def short(value: float, dimension: str = "length", digits: int = 6) -> str:
-    """A value for people to read, rounded to so many digits: ``"59.4562 mm"``, ``"1°"``; see `text`."""
+    """A value for display, rounded to ``digits`` digits: ``"59.4562 mm"``, ``"1°"``; see `text`."""
     value = float(value)
     if dimension != "angle" or value == 0 or not math.isfinite(value):
         return text(float(f"{value:.{digits}g}"), dimension)
-    # Rounded in each unit by itself: 1° is no round number of radians, and is not to look like one.
+    # Rounded in each unit separately: 1° is not a round number of radians, and must not look like one.
     names = _WRITTEN[dimension]
     best = _best_unit(value, names, dimension)
     ordered = [best, *(name for name in names if name != best)]

@@ -1,4 +1,4 @@
-"""Frozen data that is equal when its content is equal, arrays included: keys of caches, and names that last."""
+"""Frozen data that is compared by content, arrays included: keys of caches, and permanent names."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from vcc.base.describe import is_default, kind_in_words
 
 
 class Value:
-    """A base of frozen dataclasses (``eq=False``) whose fields may hold arrays: equal when all fields are.
+    """Base of frozen dataclasses (``eq=False``) whose fields may hold arrays: equal if all fields are equal.
 
-    Functions of users, and whatever else tells nothing of its content, are equal to themselves only.
+    User functions, and other objects without comparable content, are equal to themselves only.
     """
 
     def __eq__(self, other: object) -> bool:
@@ -30,15 +30,15 @@ class Value:
         return hash(content(self))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_content"}  # it may hold identities
+        return {name: value for name, value in vars(self).items() if name != "_content"}  # it may contain ids
 
 
 def content(thing: Any) -> Hashable:
-    """What two things of equal content have in common: a key that is equal when they are.
+    """A hashable key of an object's content: equal keys for equal content.
 
     Args:
-        thing: a number, a text, an array, a dataclass, or a tuple, list or dictionary of such. What is neither
-            hashable nor any of these counts by its identity.
+        thing: a number, a text, an array, a dataclass, or a tuple, list or dictionary of these. Other objects that
+            are not hashable are compared by identity.
     """
     if isinstance(thing, np.ndarray):
         plain = np.ascontiguousarray(thing + 0 if thing.dtype.kind == "f" else thing)  # -0.0 equals 0.0
@@ -49,7 +49,7 @@ def content(thing: Any) -> Hashable:
         if kept is None:
             compared = (field.name for field in dataclasses.fields(thing) if field.compare)
             kept = (type(thing), tuple(content(getattr(thing, name)) for name in compared))
-            if isinstance(thing, Value):  # frozen, arrays included by convention: what it is stays
+            if isinstance(thing, Value):  # frozen, arrays included by convention: the content does not change
                 object.__setattr__(thing, "_content", kept)
         return kept
     if isinstance(thing, tuple | list):
@@ -63,37 +63,36 @@ def content(thing: Any) -> Hashable:
     return thing if isinstance(thing, Number) else (type(thing), thing)  # 1 and 1.0 are equal
 
 
-# --- a name for the content of a value: the same from run to run and from machine to machine for equal values ---
+# --- a name for the content of a value: for equal values the same in all runs and on all machines ---
 
 
 _DIGITS = 12
-"""Of numbers: what libraries of two machines round differently is still the same."""
+"""Digits of numbers: differences of rounding between the libraries of two machines are ignored."""
 _LENGTH = 12
-"""Hexadecimal digits: by chance, two of a million cameras agree once in 500 times."""
+"""Hexadecimal digits: among a million cameras, the probability of a collision is 1 in 500."""
 
 
 class Unhashable(Exception):
-    """Something that tells nothing of its content, a Python function for instance; the message says what."""
+    """An object has no comparable content, for instance a Python function; the message names it."""
 
 
 def fingerprint(*parts: Any) -> str:
-    """12 hexadecimal digits of SHA-256 that are the same for equal parts, and differ (but for chance) for others.
+    """12 hexadecimal digits of SHA-256, the same for equal parts and different for others (except by chance).
 
     Args:
-        parts: numbers, texts, arrays, dataclasses, and tuples, lists or dictionaries of such. A dataclass counts
-            by the name of its class and those fields that it is compared by and that are not at their defaults
-            (so that a field which a later version adds changes nothing), or by what its method ``compared``
-            returns.
+        parts: numbers, texts, arrays, dataclasses, and tuples, lists or dictionaries of these. The key of a
+            dataclass is the name of its class and its compared fields that are not at their defaults (so that a
+            field added by a later version changes nothing), or the result of its method ``compared``.
 
     Raises:
-        Untold: anything else.
+        Unhashable: an object of another type.
     """
     plain = json.dumps([_plain(part) for part in parts], sort_keys=True, allow_nan=True)
     return hashlib.sha256(plain.encode()).hexdigest()[:_LENGTH]
 
 
 def _plain(thing: Any) -> Any:
-    """What JSON can hold of a thing."""
+    """A representation of an object that JSON supports."""
     if thing is None or isinstance(thing, str):
         return thing
     if isinstance(thing, Real | np.bool_):

@@ -1,3 +1,3 @@
-"""Which version this is; files that are written say it."""
+"""The version of this package, which is recorded in files."""
 
 VERSION = "0.1.0"

@@ -1,4 +1,4 @@
-"""Lists in words."""
+"""Lists as text."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from itertools import islice
 
 
 def first_few(items: Iterable[object], count: int, most: int = 12) -> str:
-    """The first of some things, and a sign where there are more: "(0, 1), (2, 3), …".
+    """The first few items as text, with a sign if there are more: "(0, 1), (2, 3), …".
 
     Args:
-        items: the things; no more of them are taken than are named.
-        count: how many there are.
-        most: how many are named.
+        items: any; only as many are consumed as are listed.
+        count: number of items.
+        most: largest number of items to list.
     """
     return ", ".join(map(str, islice(items, most))) + (", …" if count > most else "")

@@ -1,4 +1,4 @@
-"""Threads that share work, and let go of it when somebody interrupts."""
+"""Threads that share work, and stop on interrupts."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ def _begin() -> None:
 
 
 class Workers(ThreadPoolExecutor):
-    """A pool of threads. What goes wrong ends the work: what has not begun does not begin.
+    """A pool of threads. An error ends the work: tasks that have not started are cancelled.
 
-    A pool of one thread that a thread of another pool asks for is that thread itself: to hand work over and wait
-    for it would cost a turn each of the lock that all threads of Python share.
+    A pool of one thread, created by a thread of another pool, runs in that thread: handing work over and waiting
+    for it would cost two switches of the GIL.
 
-    After Ctrl-C nobody waits for the pieces at work, which are short, or, where code is compiled, cannot be broken
-    off.
+    After Ctrl-C the pool does not wait for running tasks, which are short, or cannot be interrupted because they
+    are compiled.
 
     Attributes:
-        threads: how many there are.
-        ended: (1,), True once the work has ended early: for compiled loops that take long, which look at it.
+        threads: number of threads.
+        ended: (1,), True if the work has ended early: polled by long compiled loops.
     """
 
     def __init__(self, threads: int) -> None:
@@ -61,19 +61,19 @@ class Workers(ThreadPoolExecutor):
 def uninterrupted(
     work: Callable[..., Result], /, *given: Any, end: Callable[[BaseException], object] | None = None
 ) -> Result:
-    """What some work returns, done in a thread of its own, where nothing interrupts; this one waits.
+    """Return the result of work in a separate thread, which is not interrupted; this thread waits.
 
-    Python handles Ctrl-C and other signals in its main thread alone. So what they raise never arrives in the midst
-    of a library that drops it (h5py) or that goes on in threads of its own (Zarr): what was interrupted is over
-    when it is raised here.
+    Python handles Ctrl-C and other signals only in its main thread. So their exceptions are never raised inside
+    a library that ignores them (h5py) or that continues in threads of its own (Zarr): the interrupted work has
+    finished when the exception is raised here.
 
     Args:
-        work: called with what is given.
-        given: to it.
-        end: called with what is raised here meanwhile, so that long work ends early.
+        work: called with the arguments.
+        given: the arguments.
+        end: called with an exception that is raised here in the meantime, so that long work ends early.
 
     Raises:
-        BaseException: what the work raises, or, once it is over, what was raised here meanwhile.
+        BaseException: an exception of the work, or, after the work, one that was raised here in the meantime.
     """
     with Workers(1) as worker:
         try:

@@ -1,1 +1,1 @@
-"""Light fields as data: grids, samples, and what views show of depth."""
+"""Light fields as data: grids, samples, and disparities between views."""

@@ -1,7 +1,7 @@
-"""The middle row and the middle column of a light field's views, and what disparities in them mean.
+"""The middle row and the middle column of a light field's views, and conventions for their disparities.
 
-Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than where the views
-converge.
+Disparities are those of `vcc.fields.parallax`: along u, pixels per view, positive = nearer than the plane on which
+the views converge.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from vcc.fields.sampled import to_numpy
 Array = NDArray[np.float32]
 
 LARGEST_RANGE = 64
-"""Pixels per view either way; more is a range in other units."""
+"""Pixels per view in either direction; a larger range is assumed to be in other units."""
 MARGIN = 0.3
-"""Pixels per view by which a measured range is widened: it leaves out the outermost 2 %."""
+"""Pixels per view by which a measured range is widened, because it excludes the outermost 2 %."""
 
 
 class Views(Protocol):
-    """Of `vcc.fields.samples.Samples`, what is needed here: a grid, and its blocks when they are asked for."""
+    """The part of `vcc.fields.samples.Samples` that is needed here: a grid, and its blocks on request."""
 
     @property
     def grid(self) -> Grid:
-        """Which rays the samples are."""
+        """The rays of the samples."""
 
     def read(self, block: Block, /) -> Any:
         """The samples of a block, (v, u, t, s[, channels])."""
@@ -40,11 +40,11 @@ class Views(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Arm(Brief):
-    """The middle row of views or the middle column, as views are compared with one another.
+    """The middle row or the middle column of views, prepared for matching.
 
     Args:
-        views: (views, channels, t, s), the square roots of radiance over its bright part. The square root is how
-            photon noise becomes even, and shadows count as highlights do.
+        views: (views, channels, t, s), the square roots of radiance relative to its bright part. The square root
+            makes photon noise uniform, and shadows count like highlights.
         along: the axis of views, ``"u"`` for a row, ``"v"`` for a column.
     """
 
@@ -53,24 +53,24 @@ class Arm(Brief):
 
     @property
     def middle(self) -> int:
-        """Which view is the middle one."""
+        """The number of the middle view."""
         return (len(self.views) - 1) // 2
 
     @property
     def axis(self) -> int:
-        """The axis of a picture, (channel, t, s), along which it moves from view to view."""
+        """The axis of an image, (channel, t, s), along which it moves from view to view."""
         return 2 if self.along == "u" else 1
 
 
 def check_axes(grid: Grid, fewest: int) -> None:
-    """Refuse a light field of which disparities cannot be found.
+    """Check that the disparities of a light field can be found.
 
     Args:
-        grid: its views' axes must lie along those of its pixels.
-        fewest: views that there must be in a row or column.
+        grid: its view axes must be parallel to its pixel axes.
+        fewest: smallest number of views in a row or column.
 
     Raises:
-        InputError: too few views, or a frame that turns or mixes its axes.
+        InputError: too few views, or a frame that rotates or mixes its axes.
     """
     rows, columns = grid.shape[:2]
     if max(rows, columns) < fewest:
@@ -85,7 +85,7 @@ def check_axes(grid: Grid, fewest: int) -> None:
 
 
 def arms(light_field: Views) -> list[Arm]:
-    """The middle row of views and the middle column, those of two views or more; no others are read.
+    """The middle row and the middle column of views, if they have at least two views; no other views are read.
 
     Raises:
         InputError: they are black.
@@ -116,14 +116,14 @@ def _pictures(values: Any) -> Array:
 
 
 def range_to_search(grid: Grid, given: tuple[float, float] | None) -> tuple[float, float]:
-    """(lowest, highest) disparity along u to be found, pixels per view.
+    """(lowest, highest) disparity along u to be searched, pixels per view.
 
     Args:
-        grid: of a light field, whose own range counts where none is given, widened by `MARGIN` if it was measured.
+        grid: of a light field, whose own range is used if none is passed, widened by `MARGIN` if it was measured.
         given: by a user.
 
     Raises:
-        InputError: a range that is none, that is in other units, or that cannot be measured.
+        InputError: an invalid range, one in other units, or one that cannot be measured.
     """
     if given is None:
         measured = grid.measured_disparity_range()
@@ -156,7 +156,7 @@ def cubic_weights(f: float) -> tuple[float, float, float, float]:
 
 
 def moved(view: Array, shift: float, axis: int) -> Array:
-    """A view read ``shift`` pixels further along an axis, cubic; borders repeated."""
+    """A view read at ``shift`` pixels further along an axis, cubic; borders repeated."""
     whole = math.floor(shift)
     length = view.shape[axis]
     low, high = max(0, 1 - whole), max(0, whole + 2)

@@ -1,6 +1,6 @@
-"""The disparities that a light field shows: how far what is at each pixel of a view moves to the next view.
+"""The disparities of a light field: displacement of the object at each pixel of a view to the next view.
 
-They belong to the grid of samples, not to where the grid lies: flight, lenses and prisms leave them as they are.
+They belong to the grid of samples, not to its frame: flight, lenses and prisms do not change them.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from vcc.base.progress import Progress
 from vcc.fields.sampled import as_slice
 
 OUTERMOST = 0.5
-"""Per cent of a map's pixels at either end of its disparities that their range leaves out: what errs, errs far."""
+"""Per cent of a map's pixels at either end of its disparities that their range excludes, as outliers."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DisparityMaps(Brief):
-    """Maps of the disparities that some views of a light field show.
+    """Maps of the disparities of some views of a light field.
 
     Args:
-        values: pixels per view along u, shape (maps, t, s): what is at column k of view i is at column k − d of
+        values: pixels per view along u, shape (maps, t, s): a point at column k of view i is at column k − d of
             the next one to the right.
-        views: (row, column) of the view that each map belongs to; of a piece of a light field these may be views
+        views: (row, column) of the view of each map; for a piece of a light field these may be views
             outside it, or between its own.
-        source: where the maps come from, in words.
-        whole_extent: (lowest, highest) that a piece takes over from the whole; None takes it from the values.
-        unmatched: the share of pixels at which views differ at the disparity that was found; 0 of given maps.
+        source: where the maps come from, as text.
+        whole_extent: (lowest, highest) that a piece inherits from the whole; None computes it from the values.
+        unmatched: the share of pixels at which views differ at the disparity that was found; 0 for given maps.
 
     Raises:
         InputError: other shapes, or values that are not finite.
@@ -57,7 +57,7 @@ class DisparityMaps(Brief):
 
     @classmethod
     def given(cls, maps: ArrayLike, shape: Sequence[int]) -> DisparityMaps:
-        """What a user gives with a light field.
+        """From maps that a user passes with a light field.
 
         Args:
             maps: pixels per view along u, (v, u, t, s) of all views, or (t, s) of the middle one, which is
@@ -82,9 +82,9 @@ class DisparityMaps(Brief):
     @property
     @cached
     def extent(self) -> tuple[float, float]:
-        """(lowest, highest) disparity, pixels per view along u, but for the outermost half per cent of each map.
+        """(lowest, highest) disparity, pixels per view along u, without the outermost half per cent of each map.
 
-        Of a piece it is that of the whole, so that all pieces are treated alike.
+        A piece has the extent of the whole, so that all pieces are treated alike.
         """
         if self.whole_extent is not None:
             return self.whole_extent
@@ -106,16 +106,16 @@ class DisparityMaps(Brief):
 
 
 class Disparities:
-    """What a light field shows of depth: its range and its maps, each found when first asked for and then kept.
+    """Depth information of a light field: the range and the maps of disparities, each computed on first use.
 
     Shared by a light field and all pieces of it, so that each piece is treated like the whole.
 
     Args:
-        known: the maps, where they are given.
-        find: finds them, called with a progress callback or None; without it there are none to be had.
-        measure: measures (lowest, highest) in pixels per view along u, or None where the pictures show no
-            parallax; without it there is nothing to measure.
-        whole: that of which this is a piece, where it is one.
+        known: the maps, if given.
+        find: computes them, called with a progress callback or None; without it there are no maps.
+        measure: measures (lowest, highest) in pixels per view along u, or None if the views show no
+            parallax; without it there is no range.
+        whole: the disparities of the light field of which this is a piece, if it is one.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class Disparities:
         find: Callable[[Progress | None], DisparityMaps],
         measure: Callable[[], tuple[float, float] | None],
     ) -> Disparities:
-        """These, with ways to find and to measure where they have none."""
+        """The same, with functions to find and to measure if they are missing."""
         if (self._find or self._maps) and (self._measure or self._whole):
             return self
         return Disparities(self._maps, self._find or find, self._measure or measure, self._whole)
@@ -147,28 +147,28 @@ class Disparities:
         return f"Disparities({state}: .range() and .maps() tell)"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """What is known, and the range; other processes find maps that are not in the samples that they get."""
+        """The known maps, and the range; other processes compute missing maps from their samples."""
         return _with_default, (self.maps() if self.known else None, self.range())
 
     @property
     def known(self) -> bool:
-        """Whether the maps are there without further work."""
+        """Whether the maps are available without further work."""
         return self._maps is not None or (self._whole is not None and self._whole.known)
 
     def range(self) -> tuple[float, float] | None:
-        """(lowest, highest) in pixels per view along u, measured now if it was not; None if there is none."""
+        """(lowest, highest) in pixels per view along u, measured on first use; None if there is none."""
         if not self._measured and self._measure is not None:
             self._range, self._measured = self._measure(), True
         return self._range
 
     def maps(self, progress: Progress | None = None) -> DisparityMaps:
-        """The maps, found now if they are not known yet.
+        """The maps, computed on first use.
 
         Args:
-            progress: called with (done, total) while they are found.
+            progress: called with (done, total) while they are computed.
 
         Raises:
-            InputError: what `vcc.recover.depth.disparity_maps` refuses, or a light field without samples.
+            InputError: as `vcc.recover.depth.disparity_maps`, or a light field without samples.
         """
         if self._maps is None:
             if self._find is None:
@@ -177,7 +177,7 @@ class Disparities:
         return self._maps
 
     def piece(self, ranges: Sequence[Any]) -> Disparities:
-        """Those of a piece of the light field, found from the whole; see `DisparityMaps.piece`."""
+        """The disparities of a piece of the light field, computed from the whole; see `DisparityMaps.piece`."""
         factor = ranges[1].step / ranges[3].step
 
         def measured() -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""A light field without its samples: which rays they are, how many, and what their numbers stand for."""
+"""A light field without its samples: their rays, their number, and the meaning of their values."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, indices
 Array = NDArray[np.float64]
 
 Sample = Literal["mean", "point"]
-"""What a sample says of the scene: its mean over the cell of a pixel, or its value in the middle of the cell."""
+"""Meaning of a sample: the mean of the scene over the cell of a pixel, or its value in the middle of the cell."""
 
 Beyond = tuple[tuple[int, int], ...]
 """(before, after) along (v, u, t, s)."""
 ALL: Beyond = ((0, 0),) * 4
-"""Nothing lies beyond a light field that is no piece of another."""
+"""For a light field that is not a piece of another: nothing lies beyond it."""
 
 SAMPLES_IN_WORDS: dict[Sample, str] = {"mean": "means over pixels", "point": "values at points"}
-"""What samples are, for people."""
+"""Meaning of samples, as text."""
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A part of a grid: some views, of which some rows and columns of pixels.
+    """A part of a grid: some views, and some rows and columns of their pixels.
 
     Args:
         rows: first row of views and the row after the last.
@@ -50,7 +50,7 @@ class Block:
 
     @classmethod
     def all_of(cls, shape: tuple[int, ...]) -> Block:
-        """All samples of a shape (v, u, t, s[, channels])."""
+        """The block of all samples of a shape (v, u, t, s[, channels])."""
         nv, nu, nt, ns = shape[:4]
         return cls((0, nv), (0, nu), (0, nt), (0, ns))
 
@@ -67,7 +67,7 @@ class Block:
 
     @property
     def slices(self) -> tuple[slice, ...]:
-        """What takes it from an array (v, u, t, s[, channels])."""
+        """Index for an array (v, u, t, s[, channels])."""
         return tuple(slice(first, stop) for first, stop in self.ranges)
 
 
@@ -80,13 +80,13 @@ class Grid(Value):
         frame: maps (i, j, k, l, 1) to the ray (u, v, s, t, 1) in metres and slopes; i counts along u (axis 1), j
             along v (axis 0), k along s (axis 3), l along t (axis 2).
         kind: the NumPy type of the samples.
-        sample: what a sample says of the scene.
-        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, where stated.
-        disparities: what the samples show of depth, measured when first asked for.
-        extent: (rows, columns) of views of the light field that this is a piece of, counted in this piece's steps;
-            what a camera decides by the extent of the views it decides for all pieces alike.
-        beyond: of a piece, (before, after) along (v, u, t, s): how many more samples, in this piece's steps, the
-            light field has there that this is a piece of.
+        sample: meaning of a sample.
+        disparity_range: (lowest, highest) disparity of the scene in pixels per view along u, if given.
+        disparities: of the scene, measured on first use.
+        extent: (rows, columns) of views of the light field of which this is a piece, in this piece's steps;
+            decisions of a camera that depend on the extent of the views are then the same for all pieces.
+        beyond: of a piece, (before, after) along (v, u, t, s): samples, in this piece's steps, that the whole
+            light field has beyond the piece.
     """
 
     shape: tuple[int, ...]
@@ -105,7 +105,7 @@ class Grid(Value):
 
     @property
     def channels(self) -> int | None:
-        """How many colour channels there are; None without a channel axis."""
+        """Number of colour channels; None without a channel axis."""
         return self.shape[4] if len(self.shape) == 5 else None
 
     @property
@@ -121,15 +121,14 @@ class Grid(Value):
     def piece(self, index: Index | tuple[Index, ...]) -> tuple[Grid, tuple[range, ...]]:
         """The grid of a piece, in its place, and the indices that it takes along each axis.
 
-        Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
-        n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
-        cell takes.
+        If only every n-th pixel (n ≥ 2) is kept along s and along t, means become ``"point"``: each sample
+        covers 1/n of a cell n pixels wide, and its loss of sharpness is 1/n² of that of a mean over the cell.
 
         Args:
             index: slices along (v, u, t, s[, channel]).
 
         Raises:
-            InputError: what is no slice, too many of them, or nothing left.
+            InputError: an index that is not a slice, too many slices, or an empty result.
         """
         frame, ranges = indices(self.shape, self.frame, index, LIGHT_FIELD_AXES, "a light field")
         v, u, t, s = (part.step for part in ranges[:4])
@@ -147,7 +146,7 @@ class Grid(Value):
 
     @property
     def whole_grid(self) -> Grid:
-        """The grid that this is a piece of, in this piece's steps; itself where it is none."""
+        """The grid of which this is a piece, in this piece's steps; itself if it is not a piece."""
         if self.beyond == ALL:
             return self
         first = [before for before, _ in self.beyond]
@@ -157,7 +156,7 @@ class Grid(Value):
 
     @property
     def in_whole(self) -> Block:
-        """Which part of `whole_grid` this is."""
+        """The part of `whole_grid` that this is."""
         ranges = ((before, before + n) for (before, _), n in zip(self.beyond, self.shape[:4], strict=True))
         return Block(*ranges)
 
@@ -166,7 +165,7 @@ class Grid(Value):
         return replace(self, frame=rays @ self.frame)
 
     def scaled(self, factor: float) -> Grid:
-        """The same samples in a world ``factor`` times as large (slopes stay).
+        """The same samples in a world ``factor`` times as large (slopes are unchanged).
 
         Raises:
             InputError: a factor of zero or less, or not finite.
@@ -175,7 +174,7 @@ class Grid(Value):
         return self.moved(Affine.scaling(factor, factor, 1, 1))
 
     def place_of(self, row: int, column: int) -> tuple[int, int]:
-        """(j, i) of a view, whose row and column may count from the end.
+        """(j, i) of a view, whose row and column may be negative to count from the end.
 
         Raises:
             InputError: there is no such view.
@@ -186,13 +185,13 @@ class Grid(Value):
         return row % nv, column % nu
 
     def grown(self, rows: int, columns: int) -> Grid:
-        """With so many more pixels on each side of every view."""
+        """With ``rows`` and ``columns`` more pixels on each side of every view."""
         nv, nu, nt, ns = self.shape[:4]
         shape = (nv, nu, nt + 2 * rows, ns + 2 * columns, *self.shape[4:])
         return replace(self, shape=shape, frame=self.frame @ Affine.translation(0, 0, -columns, -rows))
 
     def measured_disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest) disparity in pixels per view along u, stated or else measured; None without any."""
+        """(lowest, highest) disparity in pixels per view along u, given or else measured; None if unknown."""
         return self.disparities.range() if self.disparity_range is None else self.disparity_range
 
     def disparity_of(self, distance: float) -> float:
@@ -205,7 +204,7 @@ class Grid(Value):
         return float(by_view / by_pixel)
 
     def distance_of(self, disparity: float) -> float:
-        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
+        """The distance in metres of a point with this disparity (pixels per view along u); see `disparity_of`."""
         return float(self.distances(disparity))
 
     def distances(self, disparities: ArrayLike) -> Array:
@@ -214,11 +213,11 @@ class Grid(Value):
         return np.where(one == 0, np.inf, z / np.where(one == 0, 1, one))
 
     def homogeneous_distances(self, disparities: ArrayLike) -> tuple[Array, Array]:
-        """(z, one) of each disparity along u: its distance is z / one, which is finite at infinity too."""
+        """(z, one) of each disparity along u: the distance is z / one; both are finite at infinity, too."""
         return _homogeneous(self.frame, disparities, "u")
 
     def disparities_along(self, axis: Axis, disparities: ArrayLike) -> Array:
-        """Disparities along u as those along the axis, ``"u"`` or ``"v"``."""
+        """Convert disparities along u to the axis ``"u"`` or ``"v"``."""
         if axis == "u":
             return np.asarray(disparities, np.float64)
         by_view, by_pixel = _shown(self.frame, *self.homogeneous_distances(disparities), "v")
@@ -226,16 +225,16 @@ class Grid(Value):
 
     @property
     def middle_view(self) -> tuple[int, int]:
-        """(row, column) of the view in the middle, or of the one before it."""
+        """(row, column) of the view in the middle, or of the one before the middle."""
         return (self.shape[0] - 1) // 2, (self.shape[1] - 1) // 2
 
     @property
     def geometry(self) -> str:
-        """The geometry in words, for people: spacing, slope per pixel, convergence."""
+        """The geometry as text: spacing, slope per pixel, convergence."""
         linear = self.frame.linear
         if not np.allclose(linear[[0, 0, 0, 1, 1, 1], [1, 2, 3, 0, 2, 3]], 0):
             return "general frame"
-        # What turns the outermost views by less than a millionth of a pixel is rounding.
+        # Rotation of the outermost views by less than a millionth of a pixel is rounding.
         parallel = abs(linear[2, 0]) * self.shape[1] < 1e-6 * abs(linear[2, 2])
         converging = "parallel views" if parallel else f"converging at {short(linear[0, 0] / linear[2, 0])}"
         return f"spacing {short(abs(linear[0, 0]))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
@@ -246,7 +245,7 @@ class Grid(Value):
 
 
 def check_shape(shape: tuple[int, ...]) -> None:
-    """Refuse what is no shape of a light field.
+    """Check the shape of a light field.
 
     Raises:
         InputError: not 4-D or 5-D, or an empty axis.
@@ -261,7 +260,7 @@ def check_shape(shape: tuple[int, ...]) -> None:
 
 
 def check_frame(frame: Affine) -> None:
-    """Refuse what is no frame of a light field.
+    """Check the frame of a light field.
 
     Raises:
         InputError: not 5×5, or not invertible.
@@ -286,10 +285,10 @@ def camera_array_frame(
     slope_per_pixel: float | tuple[float, float],
     focus_distance: float = math.inf,
 ) -> Affine:
-    """The frame of pictures taken by a planar array of parallel cameras; see `vcc.LightField.from_views`.
+    """The frame of images taken by a planar array of parallel cameras; see `vcc.LightField.from_views`.
 
     Args:
-        shape: of the pictures, (rows of views, columns of views, rows, columns[, channels]).
+        shape: of the images, (rows of views, columns of views, rows, columns[, channels]).
         spacing: distance between neighbouring views, metres: one number or (dv, du).
         slope_per_pixel: pixel pitch over focal length of the cameras: one number or (pt, ps).
         focus_distance: where the views converge, metres; infinite if their axes are parallel.
@@ -317,17 +316,17 @@ def camera_array_frame(
 
 
 def pair(given: float | tuple[float, float]) -> tuple[float, float]:
-    """One number for rows and for columns, twice; two as they are."""
+    """One number as a pair for rows and columns; a pair unchanged."""
     return given if isinstance(given, tuple) else (given, given)
 
 
 def skew(frame: Affine) -> Array:
-    """All of a frame that parallel cameras do not have: what leads from x to y or from pixels to places, (10,)."""
+    """The entries of a frame that are 0 for parallel cameras: from x to y, or from pixels to places, (10,)."""
     return frame.linear[[0, 0, 0, 1, 1, 1, 2, 2, 3, 3], [1, 2, 3, 0, 2, 3, 1, 3, 0, 2]]
 
 
 def axes_agree(frame: Affine) -> bool:
-    """Whether the axes of views lie along those of pixels: nothing is turned or mixed."""
+    """Whether the axes of views are parallel to those of pixels: nothing is rotated or mixed."""
     linear = frame.linear
     across, within = [0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]
     return bool((np.abs(linear[across, within]) <= 1e-9 * np.abs(linear).max(axis=1)[across]).all())
@@ -336,12 +335,12 @@ def axes_agree(frame: Affine) -> bool:
 def along_u(
     frame: Affine, across: tuple[float, float] | None, down: tuple[float, float] | None
 ) -> tuple[float, float] | None:
-    """(lowest, highest) disparity along u of what views show along both axes: turned by 90°, the same scene.
+    """(lowest, highest) disparity along u from disparities along both axes: rotated by 90°, the same scene.
 
     Args:
         frame: of the light field.
-        across: what is shown along u, pixels per view, or None.
-        down: what is shown along v, or None.
+        across: disparities along u, pixels per view, or None.
+        down: disparities along v, or None.
     """
     by_view, by_pixel = _shown(frame, *_homogeneous(frame, down or (), "v"), "u")
     found = [*(across or ()), *(by_view[by_pixel != 0] / by_pixel[by_pixel != 0])]
@@ -349,14 +348,14 @@ def along_u(
 
 
 def _homogeneous(frame: Affine, disparities: ArrayLike, axis: Axis) -> tuple[Array, Array]:
-    """(z, one) of what shows disparities along an axis: its distance is z / one."""
+    """(z, one) of points with given disparities along an axis: the distance is z / one."""
     given = np.asarray(disparities, np.float64)
     (place, place_per_pixel), (slope, slope_per_pixel) = _plane(frame, axis)
     return place - given * place_per_pixel, slope - given * slope_per_pixel
 
 
 def _shown(frame: Affine, z: ArrayLike, one: ArrayLike, axis: Axis) -> tuple[Array, Array]:
-    """Disparities along an axis of what is z / one metres away, as (numerator, denominator)."""
+    """Disparities along an axis of points z / one metres away, as (numerator, denominator)."""
     # A point at z = −Z sends rays with s − u/Z constant; follow that along i and k.
     place, slope = _plane(frame, axis)
     by_view, by_pixel = np.multiply.outer(slope, z) - np.multiply.outer(place, one)
@@ -364,16 +363,16 @@ def _shown(frame: Affine, z: ArrayLike, one: ArrayLike, axis: Axis) -> tuple[Arr
 
 
 def _plane(frame: Affine, axis: Axis) -> Array:
-    """Place and slope along an axis (rows) by a step of views and by one of pixels (columns), 2×2."""
+    """Change of place and slope along an axis (rows) per step of views and of pixels (columns), 2×2."""
     n = 0 if axis == "u" else 1
     return frame.linear[n::2, n::2]
 
 
 def _beyond(part: range, size: int, beyond: tuple[int, int]) -> tuple[int, int]:
-    """How many more samples there are before and after those of a range, in its steps.
+    """Numbers of samples before and after those of a range, in its steps.
 
     Args:
-        part: indices that are taken along an axis.
+        part: indices of the range along an axis.
         size: of the axis.
         beyond: of the axis.
     """

@@ -1,14 +1,14 @@
-"""How the pictures of a light field move from view to view, measured from the pictures themselves.
+"""Displacement of the images of a light field from view to view, measured from the images themselves.
 
 Disparity is in pixels per view: a feature at pixel column k of one view is found at column k − d of
 the next view to the right (rows: of the next view downwards), so that d > 0 is nearer than the
 plane on which the views converge. A light field whose axes are in order shows disparities of the
-same sign along both view axes; `orientation` says where that is not so. (That *both* axes are
-reversed cannot be seen in this way: it looks like the same scene with near and far exchanged.)
+same sign along both view axes; `orientation` reports if they are not. (It cannot detect that *both* axes are
+reversed: this looks like the same scene with near and far exchanged.)
 
 The method is a plane sweep: blocks of the central view are compared with its neighbours at every
-whole shift, then, around the best one, with a view several steps away, where the same disparity is
-a larger shift and so is known more finely. Only a few views near the centre are looked at:
+integer shift, then, around the best one, with a view several steps away, where the same disparity is
+a larger shift and is measured more accurately. Only a few views near the centre are used:
 plenoptic cameras have black ones at the corners.
 """
 
@@ -34,10 +34,10 @@ _LARGEST_DISPARITY = 10  # pixels per view, searched to either side
 _FARTHEST_STEP = 3  # views from the centre in the fine search
 _FINE_REACH = 3  # whole shifts searched around the coarse disparity, to either side
 _BLOCKS_PER_AXIS = 24
-_NOISE = 0.006  # of full scale, on the square-root scale: what 8 bits and JPEG leave
+_NOISE = 0.006  # of full scale, on the square-root scale: remaining noise of 8 bits and JPEG
 _FEWEST_BLOCKS = 6
-_CLEAR = 0.5  # the score at which axes are called right
-_CLEAR_FAULT = 0.7  # and wrong: a wrong alarm would do harm to good data
+_CLEAR = 0.5  # the score above which axes are called correct
+_CLEAR_FAULT = 0.7  # and above which they are called wrong: a false alarm would damage good data
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 
 
@@ -49,7 +49,7 @@ class BlockDisparities(Brief):
         rows: the row of each block's middle in the central view, pixels, shape (n,).
         columns: likewise the column.
         disparity: pixels per view, shape (n,); positive = nearer than the plane of convergence.
-        confidence: 0 (nothing to hold on to) to 1, shape (n,).
+        confidence: 0 (no texture) to 1, shape (n,).
     """
 
     rows: NDArray[np.float64]
@@ -59,22 +59,22 @@ class BlockDisparities(Brief):
 
     @property
     def confident(self) -> NDArray[np.bool_]:
-        """Which blocks are to be trusted, shape (n,)."""
+        """Whether each block can be trusted, shape (n,)."""
         return self.confidence >= CONFIDENT
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """Whether the view axes of a light field fit its pictures, as parallax shows it.
+    """Whether the view axes of a light field are consistent with its images, as measured by parallax.
 
     Args:
-        verdict: "agrees"; "flipped" (one of the two view axes runs the wrong way); "transposed"
+        verdict: "agrees"; "flipped" (one of the two view axes is reversed); "transposed"
             (rows and columns of views are exchanged); both of these; or "undetermined" (too little
             parallax or texture, or a single row or column of views).
-        score: how clear that is, 0 to 1: the weighted majority of the blocks, minus the minority.
+        score: reliability, 0 to 1: the weighted majority of the blocks, minus the minority.
         along_u: median disparity of the blocks from one column of views to the next, pixels per
-            view; measured along the pictures' rows, or along their columns if transposed. None if
-            not known.
+            view; measured along the images' rows, or along their columns if transposed. None if
+            unknown.
         along_v: likewise from one row of views to the next.
     """
 
@@ -87,15 +87,15 @@ class Orientation:
 def block_disparities(values: NDArray[Any], axis: Axis) -> BlockDisparities:
     """Disparities of up to 576 blocks of the central view along one view axis.
 
-    Reliable within ±8 pixels per view; what moves farther, or has no texture along the axis, gets
-    confidence 0. Takes about 0.05 s, nearly whatever the size of the light field.
+    Reliable within ±8 pixels per view; blocks that move farther, or have no texture along the axis, get
+    confidence 0. Takes about 0.05 s, nearly independent of the size of the light field.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels), unsigned integers or floating point.
         axis: "u" (from one column of views to the next) or "v" (from one row to the next).
 
     Returns:
-        The blocks; none at all if there is one view only along the axis or the pictures are tiny.
+        The blocks; empty if there is only one view along the axis or the images are tiny.
 
     Raises:
         InputError: another axis or shape.
@@ -106,16 +106,16 @@ def block_disparities(values: NDArray[Any], axis: Axis) -> BlockDisparities:
 
 
 def disparity_range(values: NDArray[Any], axis: Axis | None = None) -> tuple[float, float] | None:
-    """(lowest, highest) disparity that the pictures show along one view axis, pixels per view.
+    """(lowest, highest) disparity along one view axis, pixels per view.
 
     From the 2nd to the 98th percentile of the trusted blocks. See `block_disparities` for the limits.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels).
-        axis: "u" or "v"; None takes u, and v where there is a single column of views.
+        axis: "u" or "v"; None uses u, or v if there is a single column of views.
 
     Returns:
-        None for a single view, or where too few blocks have texture.
+        None for a single view, or if too few blocks have texture.
     """
     _check(values)
     blocks = block_disparities(values, axis or ("u" if values.shape[1] > 1 else "v"))
@@ -127,11 +127,11 @@ def disparity_range(values: NDArray[Any], axis: Axis | None = None) -> tuple[flo
 
 
 def orientation(values: NDArray[Any]) -> Orientation:
-    """Whether both view axes run the way the pictures say.
+    """Whether both view axes are consistent with the images.
 
-    The same blocks are followed along both view axes. Transposed views move the picture vertically
-    from column to column: matching along the other axis of the pictures then explains them better.
-    Flipped ones show opposite signs of disparity along the two axes.
+    The same blocks are followed along both view axes. Transposed views move the image vertically
+    from column to column: matching along the other axis of the images then fits better.
+    Flipped views have opposite signs of disparity along the two axes.
 
     Args:
         values: shape (v, u, t, s) or (v, u, t, s, channels).
@@ -166,16 +166,14 @@ def orientation(values: NDArray[Any]) -> Orientation:
 
 @dataclass(frozen=True, eq=False)
 class _Measured:
-    """Blocks, with what is left unexplained at their best shift: variance of the difference."""
+    """Blocks, with the residual at their best shift: variance of the difference."""
 
     found: BlockDisparities
     residual: NDArray[np.float64]
 
 
 def _vote_crossed(straight: list[_Measured], crossed: list[_Measured]) -> tuple[bool, float]:
-    """Whether matching along the other picture axis leaves less unexplained, and by what
-    majority.
-    """
+    """Whether matching along the other image axis has a smaller residual, and its majority."""
     left_straight = straight[0].residual + straight[1].residual + 2 * _NOISE**2
     left_crossed = crossed[0].residual + crossed[1].residual + 2 * _NOISE**2
     # A block that fits one way and not the other votes; the weight is how much better it fits.
@@ -188,7 +186,7 @@ def _vote_crossed(straight: list[_Measured], crossed: list[_Measured]) -> tuple[
     weight[~np.isfinite(weight)] = 0.0
     total = float(np.abs(weight).sum())
     if np.count_nonzero(np.abs(weight) > 0.2) < _FEWEST_BLOCKS:
-        return False, 1.0  # no parallax to speak of, or none that tells the two apart
+        return False, 1.0  # hardly any parallax, or parallax that does not distinguish the two
     score = float(weight.sum()) / total
     return score < 0, abs(score)
 
@@ -206,10 +204,10 @@ def _vote_signs(along_u: BlockDisparities, along_v: BlockDisparities) -> float:
 
 
 def _measure(values: NDArray[Any], axis: Axis, picture_axis: Literal["s", "t"]) -> _Measured:
-    """Blocks of the central view, followed along a view axis by shifts along a picture axis."""
+    """Blocks of the central view, followed along a view axis by shifts along an image axis."""
     if axis == "v":
         values = values.swapaxes(0, 1)
-    # From here on, views are values[row, column] and columns are what is followed.
+    # From here on, views are values[row, column] and blocks are followed along columns.
     height, width = values.shape[2:4]
     row, middle = (values.shape[0] - 1) // 2, (values.shape[1] - 1) // 2
     size = 16 if min(height, width) >= 160 else 8
@@ -228,7 +226,7 @@ def _measure(values: NDArray[Any], axis: Axis, picture_axis: Literal["s", "t"]) 
 
 
 def _places(length: int, size: int) -> NDArray[np.intp]:
-    """Where blocks of ``size`` begin: spread evenly over ``length``, side by side at most."""
+    """Start positions of blocks of ``size``: spread evenly over ``length``, side by side at most."""
     count = min(_BLOCKS_PER_AXIS, length // size)
     if count < 1:
         return np.zeros(0, np.intp)
@@ -236,7 +234,7 @@ def _places(length: int, size: int) -> NDArray[np.intp]:
 
 
 class _Sweep:
-    """One row of views, and blocks of the middle one to be found in the others."""
+    """One row of views, and blocks of the middle view to be matched in the others."""
 
     def __init__(
         self,
@@ -260,7 +258,7 @@ class _Sweep:
         self._blocks = self._cut(self._band(middle), 0)
 
     def run(self, reach: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Disparity, confidence and residual of each block, in row-major order of the picture."""
+        """Disparity, confidence and residual of each block, in row-major order of the image."""
         shifts = np.arange(-reach, reach + 1)
         cost = np.stack([self._cost(1, int(d)) for d in shifts])
         best = cost.argmin(axis=0)
@@ -268,7 +266,7 @@ class _Sweep:
         residual = np.take_along_axis(cost, best[None], axis=0)[0]
         elsewhere = np.where(np.abs(np.arange(len(shifts))[:, None] - best) >= 2, cost, np.inf)
         rival = elsewhere.min(axis=0)
-        # In small pictures no other shift may be possible: then nothing was compared, and nothing is known.
+        # In small images no other shift may be possible: then nothing was compared, and the confidence is 0.
         inside = (best > 0) & (best < len(shifts) - 1) & np.isfinite(residual) & np.isfinite(rival)
         step = self._farthest()
         if step > 1:
@@ -287,7 +285,7 @@ class _Sweep:
         return per_block.astype(np.float64)
 
     def _raw_band(self, index: int) -> NDArray[np.float32]:
-        """The rows of a view that blocks lie in, as linear luminance."""
+        """The rows of a view that contain the blocks, as linear luminance."""
         view = self._views[index]
         band = view[self._band_rows]
         if band.ndim == 2:
@@ -299,14 +297,14 @@ class _Sweep:
         return luminance
 
     def _band(self, index: int) -> NDArray[np.float32]:
-        # The square root is how photon noise becomes even, and shadows count as highlights do.
+        # The square root makes photon noise uniform, and shadows count like highlights.
         if index not in self._bands:
             bounded = np.clip(self._raw_band(index) / np.float32(self._scale), 0, 4)
             self._bands[index] = np.sqrt(bounded)
         return self._bands[index]
 
     def _cut(self, band: NDArray[np.float32], shift: int) -> NDArray[np.float32]:
-        """The blocks, found ``shift`` columns to the left, shape (bands, blocks, size, size)."""
+        """The blocks, shifted ``shift`` columns to the left, shape (bands, blocks, size, size)."""
         windows = np.lib.stride_tricks.sliding_window_view(band, self._size, axis=1)
         starts = np.clip(self._lefts - shift, 0, self._width - self._size)
         cut: NDArray[np.float32] = windows[:, starts].reshape(
@@ -315,11 +313,11 @@ class _Sweep:
         return cut
 
     def _difference(self, band: NDArray[np.float32], shift: int) -> NDArray[np.float32]:
-        """Variance of the difference of each block; infinite where the shifted block is cut off."""
+        """Variance of the difference of each block; infinite if the shifted block is cut off."""
         difference = self._cut(band, shift)
         np.subtract(difference, self._blocks, out=difference)
         pixels = np.float32(self._size**2)
-        # Less the block's mean: views of a real camera are not equally bright (vignetting).
+        # Without the block's mean: views of a real camera are not equally bright (vignetting).
         mean = np.einsum("aibj->ab", difference) / pixels
         cost: NDArray[np.float32] = np.einsum("aibj,aibj->ab", difference, difference) / pixels
         cost = np.maximum(cost - mean**2, 0)
@@ -342,7 +340,7 @@ class _Sweep:
         return 1
 
     def _cost(self, step: int, shift: int) -> NDArray[np.float32]:
-        """Mean over the views ``step`` away of the difference at a whole shift, per block."""
+        """Mean over the views ``step`` away of the difference at an integer shift, per block."""
         sides = np.stack([self._difference(self._band(i), sign * shift) for i, sign in self._neighbours(step)])
         there = np.isfinite(sides)
         count = there.sum(axis=0)
@@ -353,9 +351,7 @@ class _Sweep:
     def _refine(
         self, step: int, disparity: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Disparity from views ``step`` away, searched around what is known; and what is left
-        over.
-        """
+        """Disparity from views ``step`` away, searched around the known one; and the residual."""
         start = np.round(disparity * step).astype(int)
         low = int(np.nanmin(start)) - _FINE_REACH
         high = int(np.nanmax(start)) + _FINE_REACH
@@ -373,9 +369,7 @@ class _Sweep:
 
 
 def _lowest(cost: NDArray[np.float32], best: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Where the parabola through the best cost and its two neighbours is lowest, −½ to ½ of a
-    shift.
-    """
+    """Position of the minimum of the parabola through the best cost and its two neighbours, −½ to ½ of a shift."""
     last = len(cost) - 1
     columns = np.arange(cost.shape[1])
     before = cost[np.maximum(best - 1, 0), columns].astype(np.float64)

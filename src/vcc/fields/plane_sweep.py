@@ -1,12 +1,12 @@
-"""The disparities of a light field's middle view by a sweep of planes.
+"""The disparities of a light field's middle view by a plane sweep.
 
-Disparities are tried one after the other, and each pixel takes the one at which the views of the middle row and
-column agree best with the middle one. What a nearer thing hides from views on one side is seen from the other, so
-that of the views to the left and to the right, and of those above and below, the half that agrees better counts
-(Kang, Szeliski and Chai 2001). Costs are gathered over a small window that follows the borders in the middle view,
-a guided filter (Hosni et al. 2013), and then along paths on which a disparity that jumps costs more than one that
-stays: semi-global matching (Hirschmüller 2008). A parabola through the lowest cost and its neighbours gives the
-disparity between steps, and a mean over the same surface around evens it out.
+Disparities are tested one after the other, and each pixel gets the one at which the views of the middle row and
+column agree best with the middle view. A point that a nearer object hides from views on one side is visible from
+the other, so only the better half of the views to the left and right, and of the views above and below, counts
+(Kang, Szeliski and Chai 2001). Costs are aggregated over a small window that follows the edges in the middle view,
+a guided filter (Hosni et al. 2013), and then along paths on which a jump of disparity costs more than a constant
+one: semi-global matching (Hirschmüller 2008). A parabola through the lowest cost and its neighbours gives the
+disparity between steps, and averaging over the same surface smooths it.
 """
 
 from __future__ import annotations
@@ -32,38 +32,38 @@ from vcc.fields.grid import Block, Grid
 from vcc.fields.sampled import to_numpy
 
 NOISE = 0.006
-"""Of full scale, on the square-root scale: what 8 bits and JPEG leave."""
+"""Share of full scale, on the square-root scale: remaining noise of 8 bits and JPEG."""
 FINEST_STEP = 0.06
-"""Of a sweep, pixels per view."""
+"""Step of a sweep, pixels per view."""
 MOST_STEPS = 240
-"""Of a sweep for what lies between views."""
+"""Steps of a sweep for views in between."""
 WINDOW = 3
-"""Pixels a side, over which costs are gathered."""
+"""Pixels a side, over which costs are aggregated."""
 SURROUNDINGS = 9
-"""Pixels a side, over which it is judged how well views agree."""
+"""Pixels a side, over which the agreement of views is averaged."""
 UNMATCHED = 0.8
-"""Disagreement from which on views show different things: unrelated textures reach 0.9, borders at their true
+"""Disagreement above which views show different objects: unrelated textures reach 0.9, edges at their true
 disparity 0.7."""
 MANY_UNMATCHED = 0.02
-"""Share of pixels at which views agree at no disparity, from which on more is searched, and a warning follows."""
-_FEWER = 0.75  # so many of the lost pixels are left at most if it is worth searching farther
+"""Share of pixels without agreement at any disparity above which a wider range is searched, with a warning."""
+_FEWER = 0.75  # a wider range is used if at most this share of the lost pixels remains
 _COARSE_SIDE, _COARSEST = 48, 4
-"""Pixels a side of the views that the first look over a wide range is taken at, and how many are one at most."""
+"""Smallest side in pixels of the coarse views for the first sweep over a wide range, and largest reduction."""
 _UNSURE = 0.2
-"""Confidence up to which the first look says nothing of the range: dark walls have 0.1 anywhere."""
+"""Confidence up to which the first sweep does not affect the range: dark walls have 0.1 anywhere."""
 _OUTERMOST = 0.005
-"""Of the confidence: what the first look finds outside of the rest is left out at either end."""
+"""Share of the confidence that is left out at either end of the range found by the first sweep."""
 _SOFTNESSES = 9  # fractions of a pixel in sixteenths, up to a half
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Swept(Brief):
-    """What a sweep finds.
+    """Result of a sweep.
 
     Args:
         disparity: pixels per view along u, of the middle view, shape (t, s).
-        confidence: 0 to 1, likewise: how much better that disparity is than any that is not its neighbour.
-        disagreement: 0 to 1, likewise: how much the views differ there from the middle one; 1 is unlike.
+        confidence: 0 to 1, likewise: how much better this disparity is than any that is not its neighbour.
+        disagreement: 0 to 1, likewise: difference of the views from the middle one; 1 means unrelated.
     """
 
     disparity: Array
@@ -80,14 +80,14 @@ def plane_sweep(
     memory_limit: int | None = None,
     progress: Progress | None = None,
 ) -> Swept:
-    """The disparity at which the views agree best with the middle one, pixel by pixel.
+    """The disparity at which the views agree best with the middle one, for each pixel.
 
     Args:
-        light_field: two views at least, its views' axes along those of its pixels.
-        disparity_range: (lowest, highest) disparity along u to be tried, pixels per view; see `range_to_search`.
-        step: between the disparities tried, pixels per view.
+        light_field: at least two views, with view axes parallel to the pixel axes.
+        disparity_range: (lowest, highest) disparity along u to be tested, pixels per view; see `range_to_search`.
+        step: between the disparities tested, pixels per view.
         window: side of the window, pixels, an odd number.
-        memory_limit: bytes that the costs and the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        memory_limit: bytes for costs and temporary arrays; None uses `vcc.base.memory.MEMORY_LIMIT`.
         progress: called with (done, total) as the sweep advances.
 
     Raises:
@@ -99,7 +99,7 @@ def plane_sweep(
     grid = light_field.grid
     check_axes(grid, fewest=2)
     low, high = range_to_search(grid, disparity_range)
-    # Three steps at the least: a parabola needs neighbours.
+    # At least three steps: a parabola needs neighbours.
     tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
     cross = arms(light_field)
     rows, columns = grid.shape[2:4]
@@ -115,7 +115,7 @@ def plane_sweep(
     best = kernels.smoothest(costs, guide, step, len(cross))
     offset, bend, lowest = _parabola(costs, best)
     found = kernels.means_of_surfaces((tried[best] + step * offset).astype(np.float32), bend)
-    lowest = np.maximum(lowest, 0)  # a guided filter goes below 0
+    lowest = np.maximum(lowest, 0)  # a guided filter can be negative
     clarity = _clarity(costs, best, lowest, step)
     most = np.float32(kernels.TRUNCATION * len(cross))
     return Swept(found, clarity, np.clip(around(lowest) / most, 0, 1))
@@ -124,14 +124,15 @@ def plane_sweep(
 def range_of_sweep(
     light_field: Views, given: tuple[float, float] | None, memory_limit: int | None = None
 ) -> tuple[float, float]:
-    """(lowest, highest) disparity along u to be tried: as given, as stated, or as far as the views agree.
+    """(lowest, highest) disparity along u to be tested: as passed, as stored in the grid, or estimated.
 
-    Sweeps of coarser views look beyond the measured range, which lacks small things and large steps. The range is
-    doubled while many pixels agree at no disparity, or best at an end; it is used if fewer pixels then do so.
+    Sweeps of coarser views search beyond the measured range, which misses small objects and large steps. The
+    range is doubled while many pixels agree at no disparity, or best at an end; a wider range is used if it has
+    fewer of them.
 
     Args:
-        light_field: as `plane_sweep` takes it.
-        given: by a user, who is taken at his word.
+        light_field: as for `plane_sweep`.
+        given: by a user, used without a check against the views.
         memory_limit: see `plane_sweep`.
 
     Raises:
@@ -141,7 +142,7 @@ def range_of_sweep(
     low, high = range_to_search(grid, given)
     if given is not None:
         return low, high
-    # No farther than infinity, unless a tenth of what was measured lies on either side of it.
+    # Not beyond infinity, unless a tenth of the measured range lies on either side of it.
     infinity, length = grid.disparity_of(math.inf), high - low
     before, behind = high - infinity, infinity - low
     ends_there = math.isfinite(infinity) and min(before, behind) < 0.1 * length + MARGIN
@@ -170,7 +171,7 @@ def range_of_sweep(
 def _first_look(
     light_field: Views, ends: tuple[float, float], memory_limit: int | None
 ) -> tuple[tuple[float, float], float]:
-    """(lowest, highest) that a sweep of coarser views finds, by confidence but for the outermost; the share lost.
+    """(lowest, highest) of a sweep of coarser views, weighted by confidence, without outliers; and the share lost.
 
     Lost are pixels at which views agree nowhere, or best at an end of the sweep.
     """
@@ -192,14 +193,14 @@ def _first_look(
 
 @dataclass(frozen=True, eq=False)
 class _Coarser:
-    """A light field with so many pixels each way in one, whole views of it."""
+    """A light field with ``factor`` × ``factor`` pixels averaged into one; reads whole views."""
 
     whole: Views
     factor: int
 
     @property
     def grid(self) -> Grid:
-        """Of the coarser pixels."""
+        """The grid of the coarser pixels."""
         fine, n = self.whole.grid, self.factor
         shape = (*fine.shape[:2], fine.shape[2] // n, fine.shape[3] // n, *fine.shape[4:])
         middle = (n - 1) / 2
@@ -217,22 +218,22 @@ class _Coarser:
 def disparity_maps(
     light_field: Views, *, memory_limit: int | None = None, progress: Progress | None = None
 ) -> DisparityMaps:
-    """The disparities by which cameras look between views: a plane sweep's, of the middle view.
+    """The disparities for views in between: from a plane sweep, of the middle view.
 
-    A light field calls this when ``between_views="depth"`` first asks for its disparities, and keeps the result.
+    A light field calls this when ``between_views="depth"`` first needs its disparities, and caches the result.
 
     Args:
-        light_field: in memory, or on disk: then its middle row and column of views are read.
+        light_field: in memory, or stored: then its middle row and column of views are read.
         memory_limit: see `vcc.recover.depth_by_plane_sweep`.
-        progress: see there.
+        progress: see `vcc.recover.depth_by_plane_sweep`.
 
     Raises:
-        InputError: as there; the way out is to give the disparities with the light field.
+        InputError: as there; the message suggests passing the disparities with the light field.
     """
     try:
         low, high = ends = range_of_sweep(light_field, None, memory_limit)
-        # Neighbouring views are half a view from what is looked at in between: a parabola through steps of this
-        # size finds disparities to a hundredth or two of a pixel, which is half of that on the sensor.
+        # Neighbouring views are half a view from the views in between: a parabola through steps of this
+        # size estimates disparities to a hundredth or two of a pixel, which is half of that on the sensor.
         step = max(FINEST_STEP, (high - low) / MOST_STEPS)
         found = plane_sweep(light_field, ends, step=step, memory_limit=memory_limit, progress=progress)
     except InputError as error:
@@ -245,7 +246,7 @@ def disparity_maps(
 
 
 def _as_if_moved(view: Array, axis: int) -> Array:
-    """A view where it is, but as soft as interpolation makes it by fractions 0, 1/16 … 1/2 of a pixel."""
+    """A view, not moved, but blurred as by interpolation at fractions 0, 1/16 … 1/2 of a pixel."""
     from scipy.ndimage import correlate1d
 
     frequencies = 2 * np.pi * np.fft.rfftfreq(64)
@@ -259,9 +260,9 @@ def _as_if_moved(view: Array, axis: int) -> Array:
 
 
 def _parabola(costs: Array, best: NDArray[np.int32]) -> tuple[Array, Array, Array]:
-    """Where, in steps from ``best``, a parabola through it and its neighbours is lowest; its bend; the best cost.
+    """The minimum of a parabola through ``best`` and its neighbours, in steps from it; its bend; the best cost.
 
-    At the ends of the range there is one neighbour only: the disparity stays where it is, with a bend of 0.
+    At the ends of the range there is only one neighbour: the offset and the bend are 0.
     """
     inner = np.clip(best, 1, len(costs) - 2)
     before, here, after = (np.take_along_axis(costs, (inner + n)[None], axis=0)[0] for n in (-1, 0, 1))
@@ -277,7 +278,7 @@ def _clarity(costs: Array, best: NDArray[np.int32], lowest: Array, step: float) 
     rival = np.full(lowest.shape, np.inf, np.float32)
     for n, cost in enumerate(costs):
         np.minimum(rival, np.maximum(cost, 0), out=rival, where=np.abs(best - n) >= apart)
-    # Where nothing else was tried, nothing is known of how clear it is.
+    # If no other disparity was tested, the confidence is unknown.
     rival, noise = np.where(np.isfinite(rival), rival, lowest), np.float32(NOISE)
     return np.asarray(np.clip(1 - (around(lowest) + noise) / (around(rival) + noise), 0, 1), np.float32)
 

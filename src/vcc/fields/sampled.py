@@ -1,6 +1,6 @@
-"""The one data idea: values on a regular grid plus an affine frame from index to physical coordinates.
+"""The common data structure: values on a regular grid plus an affine frame from index to physical coordinates.
 
-A light field, an image and a mask texture are all of this kind, so slicing one is slicing its values
+A light field, an image and a mask texture are all of this kind, so slicing one means slicing its values
 and composing its frame with a translation: a piece of a light field is a light field, in its place.
 """
 
@@ -28,17 +28,17 @@ IMAGE_AXES = (1, 0)
 def indices(
     shape: tuple[int, ...], frame: Affine, index: Index | tuple[Index, ...], axes: tuple[int, ...], what: str
 ) -> tuple[Affine, tuple[range, ...]]:
-    """The frame of a piece of values on a grid, and the indices that it takes along each axis of them.
+    """The frame of a piece of values on a grid, and the indices that it takes along each axis.
 
     Args:
         shape: of the values, whose first axes are the sampled ones.
         frame: maps indices of the values to physical coordinates.
         index: slices, one for each leading axis of the values; an ellipsis stands for whole axes.
-        axes: which value axis each frame index belongs to.
-        what: how to name the thing in an error.
+        axes: the value axis of each frame index.
+        what: name of the object in an error.
 
     Raises:
-        InputError: an integer or array index (it would lose an axis), too many slices, or nothing left.
+        InputError: an integer or array index (which would remove an axis), too many slices, or an empty result.
     """
     parts: list[Any] = list(index) if isinstance(index, tuple) else [index]
     ellipses = [place for place, part in enumerate(parts) if part is Ellipsis]
@@ -67,7 +67,7 @@ def indices(
 
 
 def taken(values: Any, ranges: Sequence[range]) -> Any:
-    """The values at these indices along each axis: a view of them, nothing is copied."""
+    """The values at these indices along each axis: a view, not a copy."""
     return values[tuple(as_slice(part) for part in ranges)]
 
 
@@ -77,7 +77,7 @@ def as_slice(part: range) -> slice:
 
 
 def to_numpy(values: Any) -> np.ndarray[Any, Any]:
-    """``values`` of any array library as a NumPy array in main memory (gradients are left behind)."""
+    """``values`` of any array library as a NumPy array in main memory (without gradients)."""
     if isinstance(values, np.ndarray):
         return values
     if hasattr(values, "detach"):
@@ -89,34 +89,34 @@ def to_numpy(values: Any) -> np.ndarray[Any, Any]:
 
 
 def as_array(values: Any, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-    """What ``numpy.asarray`` is given of something whose numbers these are (``__array__``).
+    """Values for ``__array__``: the result of ``numpy.asarray`` for an object with these values.
 
     Args:
         values: an array of any library.
         dtype: None for their own.
-        copy: None copies where it must, False never, True always.
+        copy: None copies if needed, False never, True always.
 
     Raises:
-        ValueError: a copy is needed that is not allowed, as NumPy has it.
+        ValueError: a copy is needed but not allowed, as in NumPy.
     """
     if copy is not False or isinstance(values, np.ndarray):
         return np.array(to_numpy(values), dtype=dtype, copy=copy)
     try:
         shared = np.from_dlpack(values.detach() if hasattr(values, "detach") else values)
-    except (AttributeError, BufferError, RuntimeError, TypeError) as error:  # each library has its own refusal
+    except (AttributeError, BufferError, RuntimeError, TypeError) as error:  # each library raises another type
         raise ValueError(f"numbers of {type(values).__module__} cannot be had without a copy: {error}") from error
     return np.array(shared, dtype=dtype, copy=False)
 
 
 def library_of(values: Any) -> str:
-    """The name of the package that an array, or what computes with it, comes from: "numpy", "torch", …"""
+    """The name of the package of an array, or of an object that computes with it: "numpy", "torch", …"""
     return type(values).__module__.split(".")[0]
 
 
 def has_values(values: Any) -> bool:
-    """Whether an array holds numbers that can be looked at: under a tracer there are a shape and a type only.
+    """Whether an array has readable values: under a tracer it has only a shape and a type.
 
-    Known are JAX's tracers (``jit``, ``grad``, ``vmap``), and PyTorch's fake and meta tensors and its transforms.
+    Detects JAX's tracers (``jit``, ``grad``, ``vmap``), and PyTorch's fake and meta tensors and its transforms.
     """
     kind = type(values)
     if isinstance(values, np.ndarray):
@@ -132,7 +132,7 @@ def has_values(values: Any) -> bool:
 
 
 def to_dtype(values: Any) -> np.dtype[Any]:
-    """The NumPy dtype that corresponds to that of an array of any library."""
+    """The NumPy dtype that corresponds to the type of an array of any library."""
     name = str(values.dtype).rsplit(".", 1)[-1]
     try:
         return np.dtype(name)

@@ -1,4 +1,4 @@
-"""What every light field with samples can do, wherever they are; and samples in memory."""
+"""Methods of all light fields with samples, wherever the samples are; and samples in memory."""
 
 from __future__ import annotations
 
@@ -34,24 +34,24 @@ from vcc.fields.sampled import Index, has_values, taken, to_dtype, to_numpy
 
 
 class Samples(Protocol):
-    """A light field with its samples: in memory, in a store, or made when they are asked for; all alike."""
+    """Interface of light fields with samples: in memory, stored on disk, or made on request."""
 
     @property
     def grid(self) -> Grid:
-        """Which rays the samples are, and what their numbers stand for."""
+        """The rays of the samples, and the meaning of their values."""
         ...
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes that they take where they are read from; 0 in memory."""
+        """Bytes of the samples where they are stored; 0 in memory."""
         ...
 
     def whole(self) -> Any | None:
-        """All samples, an array (v, u, t, s[, channels]) of any library, where they are in memory; else None."""
+        """All samples, an array (v, u, t, s[, channels]) of any library, if they are in memory; else None."""
         ...
 
     def check_complete(self) -> None:
-        """Refuse a light field of which views are missing, before long work on it."""
+        """Raise an error if views are missing, before long work on the light field."""
         ...
 
     def read(self, block: Block) -> Any:
@@ -60,7 +60,7 @@ class Samples(Protocol):
 
 
 class OnGrid(Shown, ABC):
-    """What a light field says of itself by its grid, wherever its samples are."""
+    """Properties of a light field that follow from its grid, wherever its samples are."""
 
     @property
     @abstractmethod
@@ -69,7 +69,7 @@ class OnGrid(Shown, ABC):
 
     @property
     def channels(self) -> int | None:
-        """How many colour channels there are; None for a light field without a channel axis."""
+        """Number of colour channels; None for a light field without a channel axis."""
         return self.grid.channels
 
     @property
@@ -79,10 +79,10 @@ class OnGrid(Shown, ABC):
 
     @property
     def whole_views(self) -> tuple[float, float]:
-        """(rows, columns) of views of the light field that this is a piece of, counted in this piece's steps.
+        """(rows, columns) of views of the light field of which this is a piece, in this piece's steps.
 
-        What a camera decides by the extent of the views it decides for all pieces alike, so that the pictures
-        of the pieces add up to the picture of the whole.
+        Decisions of a camera that depend on the extent of the views are the same for all pieces, so that the
+        images of the pieces add up to the image of the whole.
         """
         return self.grid.extent
 
@@ -92,10 +92,11 @@ class OnGrid(Shown, ABC):
         return self.grid.sample_volume
 
     def measured_disparity_range(self) -> tuple[float, float] | None:
-        """(lowest, highest) disparity in pixels per view along u, given or else measured from the pictures.
+        """(lowest, highest) disparity in pixels per view along u, given or else measured from the views.
 
-        None where there is nothing to measure it from: one view, or pictures without texture. Measured once and
-        kept, in a store from up to seven views in the middle; pieces of a light field answer as the whole does.
+        None if it cannot be measured: with one view, or without texture. Measured once and then cached, in a
+        stored light field from up to seven views in the middle; pieces of a light field return the range of the
+        whole.
         """
         return self.grid.measured_disparity_range()
 
@@ -108,15 +109,15 @@ class OnGrid(Shown, ABC):
         return self.grid.disparity_of(distance)
 
     def distance_of(self, disparity: float) -> float:
-        """The distance in metres of what shows ``disparity`` pixels per view along u: `disparity_of` undone."""
+        """The distance in metres of a point with this disparity (pixels per view along u); see `disparity_of`."""
         return self.grid.distance_of(disparity)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class InMemory(OnGrid):
-    """Radiance samples in memory and the frame that says which ray each of them is.
+    """Radiance samples in memory and the frame that maps each of them to a ray.
 
-    See `vcc.LightField`, which adds verbs, for the arguments and what is refused.
+    See `vcc.LightField`, which adds methods, for the arguments and errors.
     """
 
     values: Any
@@ -140,11 +141,11 @@ class InMemory(OnGrid):
         self._complete()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Its samples and its grid: other processes do not look at them again."""
+        """Its samples and its grid: other processes do not validate them again."""
         return type(self).of, (self.values, self.grid)
 
     def _complete(self) -> None:
-        """What was left out, filled in."""
+        """Fill in missing arguments."""
         if self.extent is None:
             object.__setattr__(self, "extent", (float(self.values.shape[0]), float(self.values.shape[1])))
         shown = self.disparity
@@ -155,11 +156,11 @@ class InMemory(OnGrid):
 
     @classmethod
     def of(cls, values: Any, grid: Grid) -> Self:
-        """Samples of a grid that are known to be sound, such as a part of others: they are not looked at again.
+        """Samples of a grid that are known to be valid, such as a part of others: they are not validated again.
 
         Args:
             values: (v, u, t, s[, channels]).
-            grid: whose shape is theirs.
+            grid: of the same shape.
         """
         made = object.__new__(cls)
         parts = {
@@ -198,7 +199,7 @@ class InMemory(OnGrid):
 
     @property
     def stored_bytes(self) -> int:
-        """Bytes to be read from elsewhere: none."""
+        """Bytes of the samples where they are stored: 0."""
         return 0
 
     def whole(self) -> Any:
@@ -206,7 +207,7 @@ class InMemory(OnGrid):
         return self.values
 
     def check_complete(self) -> None:
-        """All views are there."""
+        """All views exist."""
 
     def read(self, block: Block) -> Any:
         """The samples of a block, not copied."""
@@ -215,22 +216,21 @@ class InMemory(OnGrid):
     def __getitem__(self, index: Index | tuple[Index, ...]) -> Self:
         """A piece of the light field, in its place: slices along (v, u, t, s[, channel]).
 
-        Images of the pieces add up to the image of the whole. So a piece, where it was cut, fades towards
-        neighbours that it no longer has. For a light field of its own, which ends there:
+        Images of the pieces add up to the image of the whole. So a piece fades, at its cuts, towards
+        neighbours that it no longer has. For an independent light field, which ends there:
         ``vcc.LightField(piece.values, piece.frame)``.
 
-        Where only every second pixel (or fewer) is kept along s and along t, means become ``"point"``: of a cell
-        n pixels wide each sample covers 1/n, and what that took from sharpness is 1/n² of what a mean over the
-        cell takes.
+        If only every n-th pixel (n ≥ 2) is kept along s and along t, means become ``"point"``: each sample
+        covers 1/n of a cell n pixels wide, and its loss of sharpness is 1/n² of that of a mean over the cell.
         """
         grid, ranges = self.grid.piece(index)
         return self.of(taken(self.values, ranges), grid)
 
     def replaced(self, values: Any) -> Self:
-        """The same frame and scene with other samples, for instance on another array library.
+        """The same frame and scene with other samples, for instance of another array library.
 
         Raises:
-            InputError: another grid of samples, or what `vcc.LightField` refuses.
+            InputError: another grid of samples, or samples that `vcc.LightField` does not accept.
         """
         if tuple(values.shape)[:4] != self.shape[:4]:
             raise InputError(
@@ -263,10 +263,10 @@ def shape_of(values: Any) -> tuple[int, ...]:
 
 
 def check_is_light_field(given: Any) -> None:
-    """Refuse what is no light field, with how to make one of it: an array, the name of a file.
+    """Check that an object is a light field; the error shows how to make one from an array or a file name.
 
     Raises:
-        InputError: it has no grid of samples to be read.
+        InputError: it has no grid of samples to read.
     """
     if hasattr(given, "grid") and hasattr(given, "read"):
         return
@@ -293,7 +293,7 @@ def check_is_light_field(given: Any) -> None:
 
 
 def check_samples(values: Any) -> None:
-    """Refuse what is no radiance; arrays under a tracer are not looked at.
+    """Check that samples are valid radiance; arrays under a tracer are not checked.
 
     Raises:
         InputError: another type than unsigned integer or floating point; NaN, infinite or negative samples.
@@ -320,7 +320,7 @@ def check_samples(values: Any) -> None:
 
 
 def _extremes(values: Any) -> tuple[float, float]:
-    """The least and the largest of an array's numbers, found where they are; NaN anywhere makes both NaN."""
+    """The smallest and the largest of an array's numbers, computed on its device; NaN anywhere makes both NaN."""
     if isinstance(values, np.ndarray) or not is_array_api_obj(values):
         samples = to_numpy(values)
         return float(samples.min()), float(samples.max())
@@ -329,8 +329,8 @@ def _extremes(values: Any) -> tuple[float, float]:
 
 
 def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
-    """The disparities that samples show, measured from the views near the middle; None under a tracer."""
-    # Views near the middle are all that is looked at: no need to bring the others from another device.
+    """The range of disparities, measured from the views near the middle; None under a tracer."""
+    # Only views near the middle are used: the others need not be copied from another device.
     rows, columns = (slice(max(n // 2 - 4, 0), n // 2 + 5) for n in values.shape[:2])
     if not has_values(values):
         return None
@@ -343,5 +343,5 @@ def _range_of(values: Any, frame: Affine) -> tuple[float, float] | None:
 
 
 def maps_of(samples: InMemory, progress: Progress | None) -> DisparityMaps:
-    """The maps of disparities that samples show, found now."""
+    """The maps of disparities of the samples, computed now."""
     return disparity_maps(samples, progress=progress)

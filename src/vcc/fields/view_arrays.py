@@ -1,6 +1,6 @@
-"""Arrays of views as users have them, in one row or in a grid, and what numbers may be in place of radiance.
+"""Arrays of views in one row or in a grid, and checks for values that are not radiance.
 
-And the other way: the samples of a light field as NumPy arrays, for files.
+Also the reverse: the samples of a light field as NumPy arrays, for files.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import Samples
 
 NARROWEST = 16
-"""Pixels: an array (n, a, b, 3) with a and b of at least so many is more likely n pictures in colour."""
+"""Pixels: an array (n, a, b, 3) with a and b at least this large is more likely n images in colour."""
 FEWEST_CODES = 16
-"""Different whole numbers in a view from which on they look like 8-bit codes."""
+"""Number of different integers in a view above which they look like 8-bit codes."""
 
 
 def in_grid(values: Any, shape: tuple[int, ...], grid: tuple[int, int] | None, channels: bool | None) -> Any:
@@ -27,12 +27,12 @@ def in_grid(values: Any, shape: tuple[int, ...], grid: tuple[int, int] | None, c
 
     Args:
         values: an array of any library.
-        shape: of it.
-        grid: (rows, columns) of views that lie along one axis, row by row; None where they lie in a grid.
-        channels: whether the last axis is one of channels; None where the shape says so.
+        shape: of the array.
+        grid: (rows, columns) of views that are stored along one axis, row by row; None if they are in a grid.
+        channels: whether the last axis is one of channels; None infers it from the shape.
 
     Raises:
-        InputError: a grid or channels that do not fit; four axes that may be either.
+        InputError: a grid or channels that do not fit; an ambiguous array with four axes.
     """
     if grid is not None:
         if not isinstance(grid, tuple | list) or [isinstance(n, int | np.integer) for n in grid] != [True, True]:  # type: ignore[redundant-expr]
@@ -71,10 +71,10 @@ def in_grid(values: Any, shape: tuple[int, ...], grid: tuple[int, int] | None, c
 
 
 def warn_of_codes(values: Any) -> None:
-    """Warn where floating-point samples look like 8-bit codes; the middle view tells.
+    """Warn if floating-point samples look like 8-bit codes, judging by the middle view.
 
     Warns:
-        ResultWarning: its samples are whole numbers up to 255, many different ones.
+        ResultWarning: its samples are integers up to 255, many of them different.
     """
     if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.ndim < 4 or 0 in values.shape:
         return
@@ -88,29 +88,29 @@ def warn_of_codes(values: Any) -> None:
     )
 
 
-# --- the samples of a light field, in memory or not, as NumPy arrays: what is written to files ---
+# --- the samples of a light field, in memory or not, as NumPy arrays for writing files ---
 
 
 def all_samples(light_field: Samples) -> NDArray[Any]:
-    """All samples, (v, u, t, s[, channels]), read now where they are not in memory.
+    """All samples, (v, u, t, s[, channels]), read now if they are not in memory.
 
     Raises:
-        InputError: what reading them refuses.
+        InputError: they cannot be read.
     """
     whole = light_field.whole()
     return to_numpy(light_field.read(Block.all_of(light_field.grid.shape)) if whole is None else whole)
 
 
 def one_view(light_field: Samples, row: int, column: int) -> NDArray[Any]:
-    """The samples of one view, (t, s[, channels]); nothing else is read.
+    """The samples of one view, (t, s[, channels]); no other view is read.
 
     Args:
-        light_field: whose.
+        light_field: of the view.
         row: of views, 0 at the top.
         column: of views, 0 at the left.
 
     Raises:
-        InputError: what reading them refuses.
+        InputError: they cannot be read.
     """
     height, width = light_field.grid.shape[2:4]
     view = Block((row, row + 1), (column, column + 1), (0, height), (0, width))

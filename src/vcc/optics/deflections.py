@@ -1,8 +1,8 @@
-"""Deflections that are not affine: how a thin element changes the slopes of rays, by position.
+"""Deflections that are not affine: changes of the slopes of rays by a thin element, by position.
 
-A lens or a prism is an affine map (`vcc.Affine`). What is affine only piece by piece (arrays of lenslets, a
-biprism) or not at all (a phase plate) is one of the classes here. Each is a function of the position (x, y)
-from the element's middle and returns the slopes (Δs, Δt) that it adds.
+A lens or a prism is an affine map (`vcc.Affine`). The classes here are affine only piecewise (arrays of
+lenslets, a biprism) or not at all (a phase plate). Each is a function of the position (x, y) relative to the
+element's middle and returns the slopes (Δs, Δt) that it adds.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ class Deflection(abc.ABC):
 
     @property
     def affine(self) -> Affine | None:
-        """The same as a 5×5 map of rays, where its parameters make it one (a biprism of 0); None otherwise."""
+        """The same as a 5×5 map of rays, if its parameters make it affine (a biprism of 0); None otherwise."""
         return None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellDeflection(Brief, Deflection):
-    """Each cell of a lattice a lens and a prism of its own: Δs = −(x − x_cell)/f_cell + δs_cell.
+    """A lattice of cells, each with its own lens and prism: Δs = −(x − x_cell)/f_cell + δs_cell.
 
-    Cell (row, column) takes entry (row mod rows, column mod columns) of the tables.
+    Cell (row, column) uses entry (row mod rows, column mod columns) of the tables.
 
     Args:
         lattice: the cells.
@@ -71,11 +71,11 @@ class CellDeflection(Brief, Deflection):
 
     @property
     def affine(self) -> Affine | None:
-        """A prism where no cell is a lens and all are the same prism."""
+        """A prism if no cell is a lens and all cells are the same prism."""
         return None if self.powers.any() else _one_prism(self.slopes.reshape(-1, 2))
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The deflection by the cells that hold the places."""
+        """The deflection by the cell at each place."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         row, column = self.lattice.cell_of(x, y)
         centre_x, centre_y = self.lattice.centre_of(row, column)
@@ -85,7 +85,7 @@ class CellDeflection(Brief, Deflection):
         return slope[..., 0] - power * (x - centre_x), slope[..., 1] - power * (y - centre_y)
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The slopes at the corners of the cells, of the cells where they are steepest."""
+        """The slopes at the corners of the steepest cells."""
         at_corners = np.abs(self.powers)[..., None] * np.array(self.lattice.reach) + np.abs(self.slopes)
         s, t = at_corners.reshape(-1, 2).max(axis=0)
         return float(s), float(t)
@@ -93,11 +93,11 @@ class CellDeflection(Brief, Deflection):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FacetDeflection(Brief, Deflection):
-    """Plane facets that meet in the middle: rays in the sector around a direction are bent by its slopes.
+    """Plane facets that meet in the middle: each deflects the rays in the sector around its direction.
 
     Args:
         directions: unit vectors (x, y) of the sectors' middles, (n, 2); a place belongs to the direction
-            along which it lies furthest out.
+            with the largest projection.
         slopes: (δs, δt) that each sector adds, (n, 2).
     """
 
@@ -112,11 +112,11 @@ class FacetDeflection(Brief, Deflection):
 
     @property
     def affine(self) -> Affine | None:
-        """A prism where all facets are the same one."""
+        """A prism if all facets are equal."""
         return _one_prism(self.slopes)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The slopes of the facet that each place lies on."""
+        """The slopes of the facet at each place."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         outward = x[..., None] * self.directions[:, 0] + y[..., None] * self.directions[:, 1]
         slope = self.slopes[np.argmax(outward, axis=-1)]
@@ -139,34 +139,34 @@ class SlopeFunction(Deflection):
     function: Callable[[Array, Array], Any]
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """What the function returns, checked."""
+        """The function's values, validated."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        # As whole arrays: a function such as (−x/f, −y/f) then returns slopes of one shape.
+        # Full arrays: functions such as (−x/f, −y/f) then return slopes of one shape.
         x, y = np.broadcast_arrays(x, y)
         return checked_slopes(self.function(x, y), x, y, (x.shape, ()))
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The largest slopes on a raster of 257×257 points over the rectangle, and 5 % more."""
+        """The largest slopes on a raster of 257×257 points over the rectangle, plus 5 %."""
         x, y = np.linspace(-half_width, half_width, 257), np.linspace(-half_height, half_height, 257)
         s, t = self(x[None, :], y[:, None])
         return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
 
 
 def _one_prism(slopes: Array) -> Affine | None:
-    """The prism that all (δs, δt), (n, 2), are; None where they differ."""
+    """The prism with slopes (δs, δt) if all rows of (n, 2) are equal; else None."""
     return Affine.prism((float(slopes[0, 0]), float(slopes[0, 1]))) if (slopes == slopes[0]).all() else None
 
 
 def checked_slopes(
     returned: Any, x: Array, y: Array, shapes: tuple[tuple[int, ...], ...] | None = None
 ) -> tuple[Array, Array]:
-    """What a function returned at positions x, y as two whole arrays (Δs, Δt).
+    """The values of a function at positions x, y as two full arrays (Δs, Δt).
 
     Args:
         returned: by the function.
         x: positions, metres, that broadcast against y.
         y: likewise.
-        shapes: that each of the two may have; None allows all that broadcast to that of the positions.
+        shapes: allowed shapes of the two; None allows all that broadcast to the shape of the positions.
 
     Raises:
         InputError: not two arrays, of another shape, or with numbers that are not finite.
@@ -209,7 +209,7 @@ def as_deflection(given: Any) -> Deflection:
     """A deflection from a deflection or from any function of (x, y) in metres that returns (Δs, Δt).
 
     Raises:
-        InputError: neither.
+        InputError: an object of another type.
     """
     if isinstance(given, Deflection):
         return given

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def _refuse_names(kernel: object, label: str) -> None:
-    """Refuse a name, a class or a mere number where a kernel is wanted."""
+    """Raise an error if a name, a class or a number is given instead of a kernel."""
     if isinstance(kernel, int | float):
         raise InputError(f"{label}: {kernel!r} is no kernel: write vcc.kernels.Gaussian(sigma={kernel!r})")
     if isinstance(kernel, str | type):
@@ -32,23 +32,23 @@ def _refuse_names(kernel: object, label: str) -> None:
 
 @dataclass(frozen=True, repr=False)
 class Diffuser(Brief, Element):
-    """A diffuser that scatters light alike wherever it is hit.
+    """A diffuser that scatters light in the same way at every place.
 
     L'(u, v, s, t) = ∫∫ D(δs, δt) L(u, v, s − δs, t − δt) dδs dδt: a ray keeps its place and leaves with its
     slope changed by (δs, δt) with probability density D (paper, section 3.2.2: a convolution of the light field
-    along its slopes). No light is lost but beyond the rim.
+    along its slopes). Light is lost only outside the rim.
 
     Args:
         kernel: D: a kernel of `vcc.kernels`, or an array of shares, (rows of δt, columns of δs), its middle δ = 0.
-        slope_pitch: width of the array's cells in slope; for an array only.
-        normalise: divide an array by its sum; without it, it must sum to 1.
-        diameter: of a round diffuser, metres; outside is opaque.
-        width: of a rectangular diffuser, metres; outside is opaque. Without diameter and width there is no rim.
+        slope_pitch: width of the array's cells in slope; only for an array.
+        normalise: divide an array by its sum; otherwise its sum must be 1.
+        diameter: of a round diffuser, metres; opaque outside.
+        width: of a rectangular diffuser, metres; opaque outside. Without diameter and width there is no rim.
         height: of a rectangular diffuser, metres; None makes it square.
 
     Raises:
-        InputError: what `vcc.kernels.Samples` refuses in an array (negative, not finite, another sum than 1), an
-            array without a pitch, a kernel with one, a size of zero or less, both a diameter and a width.
+        InputError: an array that `vcc.kernels.Samples` does not accept (negative, not finite, a sum other than
+            1), an array without a pitch, a kernel with one, a size of zero or less, both a diameter and a width.
     """
 
     kernel: Kernel | NDArray[np.float64]
@@ -62,7 +62,7 @@ class Diffuser(Brief, Element):
         super().__post_init__()
         checks.opening(self.label, self.width, self.height, self.diameter)
         object.__setattr__(self, "kernel", self._as_kernel())
-        # What only says how to read an array is spent, so that equal diffusers have equal parameters.
+        # Options for reading an array are reset, so that equal diffusers have equal parameters.
         object.__setattr__(self, "slope_pitch", None)
         object.__setattr__(self, "normalise", False)
 
@@ -109,21 +109,21 @@ class CodedDiffuser(Brief, Value, Element):
 
     Args:
         kernels: one kernel or several.
-        width: of the sheet, metres; outside is opaque.
-        weights: the kernels' shares over the sheet, shape (n, rows, columns), row 0 at the top; they sum to 1 at
-            each place. Needed for several kernels.
+        width: of the sheet, metres; opaque outside.
+        weights: the kernels' shares over the sheet, shape (n, rows, columns), row 0 at the top; their sum is 1 at
+            each place. Required for several kernels.
         widths: the factor w ≥ 0 by which the kernels are stretched over the sheet, shape (rows, columns). With
-            `vcc.kernels.Gaussian(1.0)` this is the map of σ itself. Needed for a single kernel. At 0 light passes
-            unscattered.
+            `vcc.kernels.Gaussian(1.0)` this is the map of σ itself. Required for a single kernel. At 0 light
+            passes unscattered.
         height: of the sheet, metres; None keeps cells square.
         normalise: divide the weights by their sum at each place.
 
-    Numbers hold in the middles of the cells and are interpolated bilinearly between them.
+    Maps hold values at the middles of the cells and are interpolated bilinearly between them.
 
     Raises:
-        InputError: no kernels or what is not one, neither weights nor widths, shapes that do not fit, numbers
-            that are negative or not finite, weights that do not sum to 1 without ``normalise``, widths that are 0
-            throughout, a size of zero or less.
+        InputError: no kernels or objects of another type, neither weights nor widths, shapes that do not fit,
+            numbers that are negative or not finite, weights whose sum is not 1 without ``normalise``, widths that
+            are 0 throughout, a size of zero or less.
     """
 
     kernels: Kernel | tuple[Kernel, ...]
@@ -212,7 +212,7 @@ class CodedDiffuser(Brief, Value, Element):
         )
 
     def described(self) -> str:
-        """The kernels, the cells of the maps and the sheet's size in words."""
+        """The kernels, the cells of the maps and the sheet's size as text."""
         assert isinstance(self.kernels, tuple)
         assert self.height is not None
         parts = [", ".join(kernel.described() for kernel in self.kernels)]

@@ -1,4 +1,4 @@
-"""What turns light on a pixel into a number: the linear camera model of EMVA 1288, as parameters.
+"""Conversion of light on a pixel into a number: the linear camera model of EMVA 1288, as parameters.
 
 The model (EMVA Standard 1288, its linear signal model and its noise model; symbols are the
 standard's)::
@@ -7,7 +7,7 @@ standard's)::
     charge ~ Poisson(η·μ_p + μ_I·t)                photo-electrons and dark current, at most the full well
     y = black level + K · (charge + read noise)    rounded to a whole number, 0 to 2^bits − 1
 
-`vcc.run.expose` draws recordings from it.
+`vcc.run.expose` simulates recordings with it.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ PLANCK: Final = 6.62607015e-34
 LIGHT_SPEED: Final = 299792458.0
 """The speed of light in vacuum c, m/s; exact in the SI."""
 SMALLEST_SHARE: Final = 1e-9
-"""Of the photons that free an electron: less is no number to divide by."""
+"""Smallest share of the photons that free an electron, to avoid division by zero."""
 LARGEST_WELL: Final = 1e12
-"""Electrons; no pixel holds a millionth of it, and random numbers stay within 64 bits."""
+"""Electrons; no pixel holds a millionth of it. The limit keeps random numbers within 64 bits."""
 _LETTERS: Final = "RGB"
 
 
 @dataclass(frozen=True)
 class Electronics(Shown):
-    """How the pixels of a sensor turn light into numbers, in the terms of EMVA 1288.
+    """Conversion of light into numbers by the pixels of a sensor, in the terms of EMVA 1288.
 
     The defaults are those of a common monochrome machine-vision sensor (CMOS, global shutter, pixels of about
     3.5 µm), with the gain chosen so that 12 bits just hold the full well.
@@ -44,24 +44,23 @@ class Electronics(Shown):
             above 0 and up to 1, filters included; one number, or one per channel.
         wavelength: λ, metres, at which a channel's light is counted in photons (its middle wavelength); one,
             or one per channel.
-        full_well: the most electrons that a pixel holds; what is beyond is lost (it does not bloom).
+        full_well: largest number of electrons in a pixel; electrons beyond it are lost (no blooming).
         gain: K, digital numbers per electron (EMVA's overall system gain).
-        black_level: the number that stands for no electrons at all, DN.
+        black_level: the number for zero electrons, DN.
         bit_depth: bits of a number, 1 to 16.
         read_noise: standard deviation of the noise of reading a pixel, electrons rms, Gaussian (σ_d0).
-        dark_current: μ_I, electrons per second and pixel that come without light.
-        color_filter: None, or the tile of filters that repeats over the sensor from its first pixel (as the
-            picture lies on the sensor, not upright): ``"RGGB"`` or another 2×2 tile in one word, row by row,
+        dark_current: μ_I, electrons per second and pixel without light.
+        color_filter: None, or the tile of filters that repeats over the sensor from its first pixel (in the
+            sensor's orientation, not upright): ``"RGGB"`` or another 2×2 tile in one word, row by row,
             or rows of letters, ``("RG", "GB")``, of any size. R, G and B are channels 0, 1 and 2; digits name
             channels directly. Each pixel records the light field's channel of its filter.
         prnu: photo response non-uniformity: standard deviation of the pixels' sensitivity as a share of it.
         dsnu: dark signal non-uniformity: standard deviation of the pixels' offsets, electrons.
-        pattern_seed: what sensor, of all that are made alike: the pattern of PRNU and DSNU follows from it and
+        pattern_seed: identifies one sensor among equal ones: the pattern of PRNU and DSNU follows from it and
             from the number of pixels, and is the same in all recordings.
 
     Raises:
-        InputError: a value outside its range, a ragged or unreadable tile, or numbers of channels that do not
-            fit together.
+        InputError: a value outside its range, a ragged or unreadable tile, or different numbers of channels.
     """
 
     quantum_efficiency: float | tuple[float, ...] = 0.6
@@ -118,7 +117,7 @@ class Electronics(Shown):
         object.__setattr__(self, name, value)
 
     def _channel_counts(self) -> dict[str, int]:
-        """The number of channels that each parameter states, of those that state one."""
+        """The number of channels of each parameter that has one value per channel."""
         counts = {
             name: len(value)
             for name in ("quantum_efficiency", "wavelength")
@@ -130,7 +129,7 @@ class Electronics(Shown):
 
     @property
     def channels(self) -> int | None:
-        """The number of channels that the parameters state; None if the same holds for any number."""
+        """The number of channels of the parameters; None if they are the same for any number of channels."""
         return next(iter(self._channel_counts().values()), None)
 
     @property
@@ -144,7 +143,7 @@ class Electronics(Shown):
 
     @property
     def filter_channels(self) -> int:
-        """How many channels the tile has; 1 without a colour filter."""
+        """Number of channels of the tile; 1 without a colour filter."""
         return 1 + max(max(row) for row in self.tile)
 
     @property
@@ -172,7 +171,7 @@ class Electronics(Shown):
 
     @property
     def filter_in_words(self) -> str:
-        """The colour filter as people name it: ``"RGGB"``, or its size for a tile that is not 2×2."""
+        """The common name of the colour filter: ``"RGGB"``, or its size for a tile that is not 2×2."""
         if isinstance(self.color_filter, str):
             return self.color_filter
         return f"{len(self.tile)}×{len(self.tile[0])} tile" if self.color_filter else "no colour filter"
@@ -220,10 +219,10 @@ class Electronics(Shown):
         return efficiency * wavelength / (PLANCK * LIGHT_SPEED)
 
     def check_channels(self, channels: int | None) -> None:
-        """Refuse light of a number of channels that this sensor cannot record.
+        """Raise an error if this sensor cannot record light with a number of channels.
 
         Args:
-            channels: of the light; None if it is grey, without an axis of channels.
+            channels: of the light; None for grey light without an axis of channels.
 
         Raises:
             InputError: the numbers of channels differ.
@@ -260,7 +259,7 @@ def _of(given: float | tuple[float, ...], channel: int) -> float:
 
 
 def _tile(given: Any) -> str | tuple[str, ...]:
-    """A tile that can be read, in capitals: 2×2 as one word, others as rows."""
+    """A valid tile in capitals: 2×2 as one word, others as rows."""
     example = '"RGGB", or rows such as ("RG", "GB")'
     if not isinstance(given, str | tuple | list) or not all(isinstance(row, str) for row in given):
         raise InputError(f"color_filter is {given!r}: write {example}")

@@ -1,8 +1,8 @@
-"""What a thin element does, in the form that a camera needs: faces, functions of position only.
+"""The effect of a thin element in the form that a camera needs: faces, which are functions of position only.
 
-The paper's three categories of optics (section 3.2) are three faces of one thing: a linear transform is a
-deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection and a
-scatter kernel depend on where a ray meets the element; a transmission may also depend on the ray's slopes (`Term`).
+The paper's three categories of optics (section 3.2) are three faces of an element: a linear transform is a
+deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection and
+a scatter kernel depend on the place of a ray; a transmission may also depend on the ray's slopes (`Term`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern, as_pattern
 
 LONGEST_NAME = 200
-"""Letters of an element's name, which all that is said of it repeats."""
+"""Maximum number of characters of an element's name, which notes and messages repeat."""
 
 Array = NDArray[np.float64]
 
@@ -38,15 +38,14 @@ class Faces:
     """The faces of a thin element, in coordinates centred on the element. They commute.
 
     Args:
-        deflection: what is added to the slopes of rays, by position: a 5×5 `Affine` that leaves positions
-            alone (lens, prism), a `Deflection` (arrays, plates), or a function of (x, y) in metres that
-            returns (Δs, Δt); None deflects nothing. A `Deflection` whose parameters make it affine, or nothing
-            (`Deflection.affine`), is kept as that.
+        deflection: slopes added to rays, by position: a 5×5 `Affine` that does not change positions (lens, prism),
+            a `Deflection` (arrays, plates), or a function of (x, y) in metres that returns (Δs, Δt); None deflects
+            nothing. A `Deflection` whose parameters make it affine, or zero (`Deflection.affine`), is simplified.
         transmission: the share of light that passes, by position: a `vcc.patterns.Pattern` or a function of
-            (x, y) in metres; None lets all light pass.
-        scatter: how light is spread over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
-            position; None spreads nothing.
-        terms: further factors of the transmission, which depend on the direction of the arriving ray, too.
+            (x, y) in metres; None transmits all light.
+        scatter: distribution of light over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
+            position; None scatters nothing.
+        terms: further factors of the transmission, which also depend on the direction of the arriving ray.
 
     Raises:
         InputError: an affine deflection that moves positions or mixes slopes (then the element is not thin),
@@ -93,12 +92,12 @@ class Faces:
 
     @property
     def spread(self) -> Scatter | None:
-        """The scatter, a single kernel made uniform over the surface."""
+        """The scatter; a single kernel is uniform over the surface."""
         return self.scatter if isinstance(self.scatter, Scatter) else None
 
 
 def _simplest(deflection: Deflection) -> Affine | Deflection | None:
-    """The same deflection as an affine map where it is one, and as None where it does nothing."""
+    """The same deflection as an affine map if it is one, and as None if it has no effect."""
     affine = deflection.affine
     if affine is None:
         return deflection
@@ -118,15 +117,15 @@ def _check_thin(deflection: Affine) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Element(Shown, abc.ABC):
-    """An element on the axis. A new one is a frozen dataclass with parameters and one method, `faces`.
+    """An element on the axis. New elements are frozen dataclasses with parameters and one method, `faces`.
 
     Args:
         z: place on the axis, metres behind the entrance plane.
         decentre: place (x, y) of the element's middle off the axis, metres.
-        name: how to call it in messages and plots; made from its kind where empty.
+        name: for messages and plots; derived from its kind if empty.
 
     Raises:
-        InputError: a place that is not finite, or a name of more than `LONGEST_NAME` letters.
+        InputError: a place that is not finite, or a name longer than `LONGEST_NAME` characters.
     """
 
     z: float = field(default=0.0, metadata={"unit": "length"})
@@ -142,24 +141,24 @@ class Element(Shown, abc.ABC):
         named = f' "{self.name}"' if self.name else ""
         for parameter in fields(self):
             checks.plain(f"{parameter.name} of {self.kind}{named}", getattr(self, parameter.name))
-        checks.finite(f"z of {self.kind}{named}", self.z, "metres")  # which its label states
+        checks.finite(f"z of {self.kind}{named}", self.z, "metres")  # z is part of the label
         middle = checks.pair(f"decentre of {self.label}", self.decentre, "(x, y) in metres")
         object.__setattr__(self, "decentre", middle)
 
     @abc.abstractmethod
     def faces(self) -> Faces:
-        """What this element does, in coordinates centred on it."""
+        """The effect of this element, in coordinates centred on it."""
 
     @property
     def length(self) -> float:
-        """How far along the axis the element reaches from z on, metres; 0 for a thin one."""
+        """Extent of the element along the axis from z on, metres; 0 for a thin one."""
         return 0.0
 
     def parts(self) -> tuple[Part, ...]:
-        """What light meets in turn, in coordinates centred on the element: for a thin one, its faces alone.
+        """The parts that light meets in order, in coordinates centred on the element: a thin one's faces alone.
 
-        A thick element lists `Faces` and, between them, the `Affine` steps by which rays get from one to the
-        next; the first starts at z, the last ends at z + `length`.
+        A thick element returns `Faces` and, between them, the `Affine` maps of rays from one to the
+        next; the first part starts at z, the last ends at z + `length`.
         """
         with checks.within(self.label):
             faces = self.faces()
@@ -169,19 +168,19 @@ class Element(Shown, abc.ABC):
 
     @property
     def kind(self) -> str:
-        """The kind of element in words, small letters."""
+        """The kind of element as text, in lower case."""
         return kind_in_words(type(self))
 
     @property
     def label(self) -> str:
-        """How messages and plots call this element."""
+        """Name of this element in messages and plots."""
         if not self.name:
             return f"{self.kind} at z = {self.z * 1e3:g} mm"
         return f'"{self.name}"' if self._named_by_kind else f'{self.kind} "{self.name}"'
 
     @property
     def called(self) -> str:
-        """Its kind and its name, as drawings have them: ``lens main``; ``lens 2`` where the name says both."""
+        """Its kind and name for drawings: ``lens main``; ``lens 2`` if the name includes the kind."""
         return self.name if self._named_by_kind else f"{self.kind} {self.name}".strip()
 
     @property
@@ -189,9 +188,9 @@ class Element(Shown, abc.ABC):
         return re.fullmatch(rf"{re.escape(self.kind)}( \d+)?", self.name) is not None
 
     def described(self) -> str:
-        """The element's parameters in words, for `explain`."""
+        """The element's parameters as text, for `explain`."""
         return parameters_in_words(self, leave_out=("z", "name", "source"))
 
 
 Part = Faces | Affine
-"""One thing that light meets: the faces of something thin, or a step to another plane."""
+"""One part that light meets: the faces of a thin element, or a map of rays to another plane."""

@@ -1,4 +1,4 @@
-"""First-order systems: any linear step of rays between two planes, a real lens among them."""
+"""First-order systems: any linear map of rays between two planes, including real lenses."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from vcc.shapes.patterns import Circle
 Matrix = NDArray[np.float64]
 
 ETENDUE_TOLERANCE = 1e-3
-"""How far a determinant may be from 1: matrices copied from papers and data sheets are rounded."""
+"""Allowed deviation of a determinant from 1: matrices copied from papers and data sheets are rounded."""
 _AFOCAL = 1e-9
 """A power (1/metres) below which a focal length counts as infinite: it would be longer than 10⁹ m."""
 _TELECENTRIC = 1e-12
-"""A magnification of the pupil below which the pupil lies at infinity: what rounding leaves of a zero."""
+"""A magnification of the pupil below which the pupil is at infinity: rounding error of a zero."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Pupil:
 
     Args:
         distance: from the system's plane on that side, metres, positive towards +z: an entrance pupil from
-            the entrance plane, an exit pupil from the exit plane. Infinite where the system is telecentric.
-        diameter: metres; infinite where the distance is.
+            the entrance plane, an exit pupil from the exit plane. Infinite if the system is telecentric.
+        diameter: metres; infinite if the distance is.
     """
 
     distance: float = field(metadata={"unit": "length"})
@@ -43,11 +43,11 @@ class Pupil:
 
 @dataclass(frozen=True)
 class FirstOrder(Element):
-    """A linear step of rays from the plane z to the plane z + length: thick lens, real lens, relay, telescope.
+    """A linear map of rays from the plane z to the plane z + length: thick lens, real lens, relay, telescope.
 
     ⎡u'⎤   ⎡A B⎤ ⎡u⎤
-    ⎣s'⎦ = ⎣C D⎦ ⎣s⎦, likewise v and t. All of paraxial (Gaussian) optics is in the matrix; aberrations are not.
-    Both planes stand in air. The system is known by its two ends only: no other element can stand inside, but
+    ⎣s'⎦ = ⎣C D⎦ ⎣s⎦, likewise v and t. The matrix describes all of paraxial (Gaussian) optics, but no aberrations.
+    Both planes are in air. Only the two ends of the system are described: no other element can be inside, but
     one round aperture stop can be part of it.
 
     Distances below are measured along +z: front ones from the plane z, back ones from the plane z + length.
@@ -58,16 +58,16 @@ class FirstOrder(Element):
             of rows.
         length: from the first plane to the last, metres, 0 or more.
         stop_from_entrance: the matrix, of any of these forms, from the plane z to the aperture stop inside
-            (slopes times the refractive index where the stop lies in glass).
+            (slopes times the refractive index if the stop is in glass).
         stop_diameter: of the round stop, metres.
         entrance_diameter: of a round rim at the plane z, metres; None for no rim.
         exit_diameter: of a round rim at the plane z + length, metres; None for no rim.
-        source: where the matrix comes from, in words.
+        source: where the matrix comes from, as text.
 
     Raises:
-        InputError: a matrix of another shape, that is not finite, or whose determinant is not 1 within
-            1e-3 (light would be made brighter or darker: étendue is conserved between planes in air); a
-            negative length; a diameter of 0 or less; half of a stop.
+        InputError: a matrix of another shape, not finite, or with a determinant that differs from 1 by more than
+            1e-3 (light would become brighter or darker: étendue is conserved between planes in air); a
+            negative length; a diameter of 0 or less; only one of the two arguments of a stop.
     """
 
     matrix: ArrayLike | Matrix
@@ -100,7 +100,7 @@ class FirstOrder(Element):
             )
 
     def _checked(self, given: Any, name: str) -> tuple[tuple[float, ...], ...]:
-        """A matrix as a tuple of rows, which compares, hashes and is written to files as plain data."""
+        """A matrix as a tuple of rows, which is compared, hashed and saved as plain data."""
         try:
             rows = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError):
@@ -112,7 +112,7 @@ class FirstOrder(Element):
             )
         with checks.within(f"{name} of {self.label}"):
             step = as_ray_map(rows)
-        # Each axis of a symmetric system counts: its 4×4 determinant is the square of the 2×2 one.
+        # Each axis of a symmetric system is tested: its 4×4 determinant is the square of the 2×2 one.
         determinant = float(np.linalg.det(rows)) if len(rows) == 2 else step.determinant
         if abs(determinant - 1) > ETENDUE_TOLERANCE:
             raise InputError(
@@ -174,11 +174,11 @@ class FirstOrder(Element):
         )
 
     def faces(self) -> Faces:
-        """Nothing: what a thick element does lies between its planes; see `parts`."""
+        """No faces: the effect of a thick element is between its planes; see `parts`."""
         return Faces()
 
     def parts(self) -> tuple[Part, ...]:
-        """Rims and stop, where there are any, and the steps between them."""
+        """Rims and stop, if there are any, and the maps between them."""
         steps: list[Part] = []
         if self.entrance_diameter is not None:
             steps.append(Faces(transmission=Circle(self.entrance_diameter)))
@@ -193,7 +193,7 @@ class FirstOrder(Element):
 
     @property
     def affine(self) -> Affine:
-        """The step as a 5×5 map of rays, from the plane z to the plane z + length."""
+        """The 5×5 map of rays from the plane z to the plane z + length."""
         return as_ray_map(self.matrix)
 
     @property
@@ -238,7 +238,7 @@ class FirstOrder(Element):
 
     @property
     def entrance_pupil(self) -> Pupil:
-        """The stop as seen from the scene: with ((a, b), (c, d)) to it: at b/a, diameter / |a| wide.
+        """The stop as seen from the scene: with matrix ((a, b), (c, d)) to the stop, at b/a, diameter / |a| wide.
 
         Raises:
             InputError: there is no stop, or the system is not rotationally symmetric.
@@ -248,7 +248,7 @@ class FirstOrder(Element):
 
     @property
     def exit_pupil(self) -> Pupil:
-        """The stop as seen from the sensor, likewise through what is behind it.
+        """The stop as seen from the sensor, likewise through the optics behind the stop.
 
         Raises:
             InputError: there is no stop, or the system is not rotationally symmetric.
@@ -262,7 +262,7 @@ class FirstOrder(Element):
         return _abcd(as_ray_map(self.stop_from_entrance), f"stop_from_entrance of {self.label}")
 
     def _pupil(self, a: float, b: float) -> Pupil:
-        """The plane on which a ray's place is the place on the stop, magnified: a·u + b·s ∝ u + distance·s."""
+        """The plane on which a ray's place is proportional to that on the stop: a·u + b·s ∝ u + distance·s."""
         assert self.stop_diameter is not None
         if abs(a) < _TELECENTRIC:
             return Pupil(math.inf, math.inf)
@@ -281,7 +281,7 @@ class FirstOrder(Element):
     def image_distance(self, object_distance: float) -> float:
         """From the exit plane to the image of a plane of the scene, metres: −(A·o + B) / (C·o + D).
 
-        A sensor stands in focus at ``z + length + image_distance(object_distance)``.
+        A sensor is in focus at ``z + length + image_distance(object_distance)``.
 
         Args:
             object_distance: o, from the plane of the scene to the entrance plane, metres, positive before it;
@@ -291,7 +291,7 @@ class FirstOrder(Element):
             Positive for a real image behind the lens, negative for a virtual one.
 
         Raises:
-            InputError: the image lies at infinity; the system is not rotationally symmetric.
+            InputError: the image is at infinity; the system is not rotationally symmetric.
         """
         (a, b), (c, d) = self.abcd
         if math.isinf(object_distance):
@@ -305,19 +305,20 @@ class FirstOrder(Element):
         return float(-(a * object_distance + b) / slope)
 
     def from_entrance_pupil(self, z: float = 0.0) -> FirstOrder:
-        """The same system told from its entrance pupil, which is then its first plane and stands at z.
+        """The same system described from its entrance pupil, which becomes its first plane, at z.
 
-        Light before the first surface flies free, so that its rays can be told on any plane, on that of the pupil
-        even where glass stands: the matrix is multiplied by the flight from the pupil back to the old first plane.
-        Views of a light field that stand on the pupil are taken from the lens's own perspective centre, and its
-        stop asks for no others. Where the pupil lies behind the last plane, that plane moves to the pupil too.
+        Light before the first surface propagates freely, so its rays can be described on any plane, including
+        the plane of the pupil even if there is glass: the matrix is multiplied by the flight from the pupil back
+        to the old first plane. Views of a light field on the pupil are seen from the lens's own centre of
+        perspective, and its stop requests no other views. If the pupil is behind the last plane, the last plane
+        moves to the pupil too.
 
         Args:
             z: of the pupil, metres; 0 is the plane of the light field.
 
         Raises:
-            InputError: no stop, a pupil at infinity (telecentric), or a rim at the first plane (or, where that
-                moves, the last), which would no longer stand there.
+            InputError: no stop, a pupil at infinity (telecentric), or a rim at the first plane (or the last, if it
+                moves), which would no longer be at that plane.
         """
         distance = self.entrance_pupil.distance
         if math.isinf(distance):
@@ -342,7 +343,7 @@ class FirstOrder(Element):
         )
 
     def reversed(self) -> FirstOrder:
-        """The same system met from its other end, at the same z: mirrored in a plane across the axis."""
+        """The same system from its other end, at the same z: mirrored in a plane across the axis."""
         turn = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])
         given = [self.matrix] if self.stop_from_entrance is None else [self.matrix, self.stop_from_entrance]
         symmetric = all(len(np.asarray(each)) == 2 for each in given)
@@ -365,7 +366,7 @@ class FirstOrder(Element):
         )
 
     def described(self) -> str:
-        """The focal length where there is one, the length, stop and rims in words."""
+        """The focal length if there is one, the length, stop and rims as text."""
         try:
             power = f"focal length {short(self.focal_length)}" if math.isfinite(self.focal_length) else "afocal"
         except InputError:
@@ -406,7 +407,7 @@ def surface_power(index_before: float, index_after: float, radius: float) -> flo
 
 
 def refraction(power: float) -> Matrix:
-    """A surface on (u, n·s): n'·s' = n·s − power·u. The slope is taken times the index, so determinants are 1."""
+    """A surface on (u, n·s): n'·s' = n·s − power·u. Slopes are multiplied by the index, so determinants are 1."""
     return np.array([[1.0, 0.0], [-power, 1.0]])
 
 

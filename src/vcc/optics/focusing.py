@@ -1,4 +1,4 @@
-"""Where the sensor must stand, by first-order optics."""
+"""Place of the sensor for a sharp image, by first-order optics."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ from vcc.optics.train import Train, touch
 _FAR = 1e9
 """Metres; a place behind all elements."""
 _PARALLEL = 1e-9
-"""Slopes per metre of aperture, 1/m, below which light counts as parallel: an image 10⁹ m away."""
+"""Slopes per metre of aperture, 1/m, below which light is treated as parallel: an image 10⁹ m away."""
 _ALIKE = 1e-6
-"""Share of the beam's size in focus by which two axes may differ: what rounding leaves of none."""
+"""Share of the beam's size by which the two axes may differ in focus, for rounding errors."""
 
 
 def focused_train(elements: Iterable[Element], sensor: Sensor, distance: float, name: str = "") -> Train:
-    """A train whose sensor stands where a point is sharp.
+    """A train whose sensor is placed where a point is in focus.
 
-    Light of a point Z before the entrance plane meets it at u with the slope u/Z. All that is affine on the way
-    (thin lenses, first-order systems, quadratic plates) takes (u, u/Z) to (P·u, Q·u) behind the last element, and
-    the rays meet d behind that, where P + d·Q = 0; for one thin lens that is 1/f = 1/Z + 1/d. Prisms and decentred
-    lenses move the image sideways only. Lens arrays, other plates and diffusers are passed over: they do not focus
-    as a lens does.
+    Light of a point Z before the entrance plane meets it at u with the slope u/Z. All affine optics on the way
+    (thin lenses, first-order systems, quadratic plates) map (u, u/Z) to (P·u, Q·u) behind the last element, and
+    the rays meet d behind it, where P + d·Q = 0; for one thin lens this is 1/f = 1/Z + 1/d. Prisms and decentred
+    lenses only move the image sideways. Lens arrays, other plates and diffusers are ignored: they do not focus
+    like a lens.
 
     Args:
-        elements: as a `vcc.Camera` takes them.
-        sensor: its z is not looked at.
+        elements: as in `vcc.Camera`.
+        sensor: its z is ignored.
         distance: Z, metres before the entrance plane, above 0; may be infinite.
         name: of the train.
 
     Raises:
-        InputError: no distance; no real image, or one before the last element; an image that is sharp along one
-            axis only (astigmatism); or what `vcc.Camera` refuses.
+        InputError: an invalid distance; no real image, or one before the last element; an image that is sharp
+            along one axis only (astigmatism); or arguments that `vcc.Camera` does not accept.
     """
     distance = checks.above_zero("distance", distance, unit="m", infinite=True)
     listed = Train(elements, _at(sensor, _FAR)).elements
@@ -57,12 +57,12 @@ def focused_train(elements: Iterable[Element], sensor: Sensor, distance: float, 
 
 
 def _at(sensor: Any, z: float) -> Any:
-    """The sensor at another place; what is none is left to the train, which refuses it with what to write."""
+    """The sensor at another place; other objects are returned as they are, for the error raised by the train."""
     return replace(sensor, z=z) if isinstance(sensor, Sensor) else sensor
 
 
 def _meeting(beam: NDArray[np.float64], slopes: NDArray[np.float64], distance: float, end: float) -> float:
-    """The d at which beam + d·slopes is 0, both 2×2: from two places of the entrance plane."""
+    """The d at which beam + d·slopes is 0, both 2×2: for two places of the entrance plane."""
     if np.abs(slopes).max() < _PARALLEL:
         raise InputError(f"light of {_point(distance)} leaves the last element parallel: it is sharp nowhere")
     d = -float((beam * slopes).sum() / (slopes * slopes).sum())
@@ -99,7 +99,7 @@ def _why_not_behind(elements: tuple[Element, ...], image: float, distance: float
 
 
 def bends(element: Element) -> bool:
-    """Whether an element has a part that is affine and does more than to shift slopes."""
+    """Whether an element has an affine part that does more than shift slopes."""
     for part in element.parts():
         step = part if isinstance(part, Affine) else part.affine
         if step is not None and not np.array_equal(step.linear, np.eye(4)):

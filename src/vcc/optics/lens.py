@@ -14,14 +14,14 @@ from vcc.shapes.patterns import Circle
 class Lens(Element):
     """A thin lens, with or without a rim: s' = s − u/f (paper, eq. 3).
 
-    Paraxial: slopes, not angles, so a perfect lens at any aperture.
+    Paraxial: slopes, not angles, so the lens is perfect at any aperture.
 
     Args:
         focal_length: metres; negative for a diverging lens.
-        diameter: of the round opening, metres; None lets rays pass at any distance from the axis.
+        diameter: of the round opening, metres; None for no rim.
 
     Raises:
-        InputError: a focal length of 0 or not a number, a diameter of 0 or less.
+        InputError: a focal length of 0 or NaN, a diameter of 0 or less.
     """
 
     focal_length: float = field(metadata={"unit": "length"})

@@ -1,4 +1,4 @@
-"""Arrays of lenslets and of prisms: what plenoptic cameras are made of."""
+"""Arrays of lenslets and of prisms, for plenoptic cameras."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vcc.shapes.lattice import CellApertures, CellBlock, Lattice, interleaved
 from vcc.shapes.patterns import Bounded, Open, Pattern
 
 LARGEST_DISC = {"square": math.pi / 4, "hexagonal": math.pi / (2 * math.sqrt(3))}
-"""The share of a cell that the largest disc in it covers."""
+"""The share of a cell's area that the largest disc in it covers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,7 +28,7 @@ class LensArray(Brief, Element):
 
     Within a cell centred at c the deflection is that of a thin lens: Δs = −(x − c)/f. With the sensor f behind,
     each lenslet images the main lens (Ng et al. 2005: plenoptic 1.0); with the sensor at another distance b it
-    relays a picture formed at a before it, 1/a + 1/b = 1/f (Lumsdaine and Georgiev 2009: focused plenoptic, 2.0).
+    relays an image formed at a before it, 1/a + 1/b = 1/f (Lumsdaine and Georgiev 2009: focused plenoptic, 2.0).
     With ``focal_length=math.inf``, circular openings and a small fill factor it is an array of pinholes.
 
     Args:
@@ -37,18 +37,18 @@ class LensArray(Brief, Element):
             interleaved so that neighbours differ (`vcc.shapes.lattice.interleaved`), the first at ``offset``.
         layout: ``"square"`` or ``"hexagonal"`` (every second row shifted by half a pitch).
         rotation: of the rows against x, radians, from x towards y.
-        offset: place (x, y) of the centre of a lenslet from the element's middle, metres; at (0, 0) one is centred
-            there.
+        offset: place (x, y) of the centre of a lenslet relative to the element's middle, metres; (0, 0) centres
+            one there.
         fill_factor: share of a cell's area that is clear, greater than 0, up to 1, in the middle of an opaque
-            border; None leaves as much clear as the openings' shape allows.
+            border; None makes the openings as large as their shape allows.
         circular: whether openings are discs, which cover at most π/4 of a square cell and π/(2√3) of a hexagonal
             one; otherwise they have the shape of the cells.
-        width: of the whole sheet, metres, opaque outside; None leaves it unbounded.
+        width: of the whole sheet, metres, opaque outside; None is unbounded.
         height: metres; None makes the sheet square.
 
     Raises:
-        InputError: a pitch of 0 or less, a focal length of 0 or not a number, an unknown layout, a fill factor
-            that openings of this shape cannot have, a size of 0 or less, or a height without a width.
+        InputError: a pitch of 0 or less, a focal length of 0 or NaN, an unknown layout, a fill factor
+            that is impossible for openings of this shape, a size of 0 or less, or a height without a width.
     """
 
     pitch: float = field(metadata={"unit": "length"})
@@ -80,7 +80,7 @@ class LensArray(Brief, Element):
             return
         way_out = "leave it out for openings as large as can be"
         checks.above_zero(f"fill_factor of {self.label}", self.fill_factor, most=1, way_out=way_out)
-        # A limit worked out by hand may differ from ours in its last digits.
+        # A limit computed by hand may differ from ours in its last digits.
         if self.circular and self.fill_factor > LARGEST_DISC[self.layout] * (1 + 1e-9):
             raise InputError(
                 f"fill_factor of {self.label} is {self.fill_factor}, and discs cover at most "
@@ -105,14 +105,14 @@ class LensArray(Brief, Element):
 
     @property
     def kinds(self) -> NDArray[np.int64]:
-        """Which focal length each cell has, a table (rows, columns) that repeats over the lattice."""
+        """The number of the focal length of each cell, a table (rows, columns) that repeats over the lattice."""
         return interleaved(self.layout, len(self.focal_lengths))
 
     def micro_images(self, distance_to_main_lens: float, distance_to_sensor: float) -> Lattice:
-        """Where on the sensor the lenslets image the middle of the main lens, as a lattice in the camera's x, y.
+        """Places on the sensor where lenslets image the middle of the main lens, as a lattice in camera x, y.
 
-        The ray from the middle of the main lens through that of a lenslet goes on straight: the lenslets' places
-        grow by 1 + b/d around the axis, and so does their pitch (Dansereau, Pizarro and Williams 2013).
+        The ray from the middle of the main lens through the middle of a lenslet is straight: the lenslets'
+        places and their pitch are scaled by 1 + b/d about the axis (Dansereau, Pizarro and Williams 2013).
 
         Args:
             distance_to_main_lens: d, from the main lens, which is centred on the axis, to the array, metres.
@@ -128,7 +128,7 @@ class LensArray(Brief, Element):
         return Lattice(self.layout, growth * self.pitch, self.rotation, (centre[0], centre[1]))
 
     def faces(self) -> Faces:
-        """A lens in each cell, and what is clear where not all is."""
+        """A lens in each cell, and the openings if they do not cover everything."""
         powers = (1 / np.array(self.focal_lengths))[self.kinds]
         deflection = CellDeflection(self.lattice, powers, np.zeros((*powers.shape, 2)))
         return Faces(deflection=deflection, transmission=self._transmission())
@@ -142,29 +142,30 @@ class LensArray(Brief, Element):
         return Bounded(opening, self.width, self.width if self.height is None else self.height)
 
     def _opening_scale(self) -> float:
-        """The openings' size as a share of the cells': of discs, diameter over pitch."""
+        """The openings' size as a share of the cells' size: for discs, diameter over pitch."""
         largest = LARGEST_DISC[self.layout] if self.circular else 1.0
         return 1.0 if self.fill_factor is None else min(math.sqrt(self.fill_factor / largest), 1.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PrismArray(Brief, Value, Element):
-    """So many rows and columns of prisms side by side, each of its own deflection, opaque around them.
+    """Rows and columns of prisms side by side, each with its own deflection, opaque around them.
 
-    With a focal length, each cell is a lens too: the lens-prism array with which Georgiev and Intwala (2006) take
-    a light field by one picture; a lens moved by −f·δ within its cell does the same as a prism of deflection δ.
+    With a focal length, each cell is also a lens: the lens-prism array of Georgiev and Intwala (2006), which
+    records a light field in one image; a lens moved by −f·δ within its cell is equivalent to a prism of
+    deflection δ.
 
     Args:
         slopes: (δs, δt) that each cell adds to rays, (rows, columns, 2), row 0 at the top, column 0 at the left.
         pitch: distance between the centres of neighbouring cells, metres.
-        layout: ``"square"``, or ``"hexagonal"``: every second row, from the second on, stands half a pitch to
-            the right. The middle of the rectangle around all cells is the element's middle.
+        layout: ``"square"``, or ``"hexagonal"``: every second row, from the second on, is shifted by half a
+            pitch to the right. The middle of the rectangle around all cells is the element's middle.
         focal_length: of all cells, metres; None for prisms alone.
-        rotation: of the array around the element's middle, radians, from x towards y. It does not turn slopes.
+        rotation: of the array around the element's middle, radians, from x towards y. It does not rotate slopes.
 
     Raises:
         InputError: slopes of another shape or not finite, a pitch of 0 or less, an unknown layout, a focal length
-            of 0 or not a number.
+            of 0 or NaN.
     """
 
     slopes: NDArray[np.float64]
@@ -190,7 +191,7 @@ class PrismArray(Brief, Value, Element):
 
     @property
     def lattice(self) -> Lattice:
-        """The cells, in coordinates centred on the element; (0, 0) is the upper left one."""
+        """The cells, in coordinates centred on the element; (0, 0) is the upper left cell."""
         rows, columns = self.shape
         around_first = _lattice(self, (0.0, 0.0))
         # A shifted row is a quarter of a pitch to the right of the middle, as the others are to the left.
@@ -201,7 +202,7 @@ class PrismArray(Brief, Value, Element):
         return _lattice(self, (sine * down - cosine * across, -sine * across - cosine * down))
 
     def faces(self) -> Faces:
-        """A prism in each cell, a lens too if there is a focal length, and the clear block of cells."""
+        """A prism in each cell, also a lens if there is a focal length, and the clear block of cells."""
         rows, columns = self.shape
         power = 0.0 if self.focal_length is None else 1 / self.focal_length
         deflection = CellDeflection(self.lattice, np.full((rows, columns), power), self.slopes)
@@ -210,13 +211,13 @@ class PrismArray(Brief, Value, Element):
         return Faces(deflection, CellBlock(self.lattice, rows, columns))
 
     def described(self) -> str:
-        """The number of cells and the parameters in words."""
+        """The number of cells and the parameters as text."""
         steepest = float(np.abs(self.slopes).max())
         words = parameters_in_words(self, leave_out=("z", "name", "slopes"))
         return f"{self.shape[0]}×{self.shape[1]} prisms of up to {steepest:g}, {words}"
 
 
 def _lattice(array: LensArray | PrismArray, offset: tuple[float, float]) -> Lattice:
-    """The cells of an array; errors name it."""
+    """The cells of an array; errors name the array."""
     with checks.within(array.label):
         return Lattice(array.layout, array.pitch, array.rotation, offset)

@@ -1,4 +1,4 @@
-"""The mask: a flat sheet that lets light through by position."""
+"""The mask: a flat sheet whose transmission depends on position."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ class Mask(Element):
     Args:
         pattern: an array of transmissions (rows, columns), 0 to 1, row 0 at the top; or a pattern from
             `vcc.patterns`; or any function of (x, y) in metres that returns transmission.
-        width: of the sheet, metres; needed for an array, and what is outside is opaque. None for a pattern
-            leaves it unbounded.
+        width: of the sheet, metres, opaque outside; required for an array. For a pattern, None is unbounded.
         height: metres; None keeps an array's cells square, and makes other sheets square.
 
     Raises:
         InputError: an array that is empty, not 2-D or outside 0 to 1, an array without a width, a size of
-            zero or less, or a mask through which nothing passes.
+            zero or less, or a mask that transmits nothing.
     """
 
     pattern: ArrayLike | Pattern | Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]
@@ -65,5 +64,5 @@ class Mask(Element):
         return Faces(transmission=Bounded(pattern, self.width, height))
 
     def described(self) -> str:
-        """The pattern and the sheet's size in words."""
+        """The pattern and the sheet's size as text."""
         return super().described() if not self.source else f"{super().described()}, from {self.source}"

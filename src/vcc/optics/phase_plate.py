@@ -1,4 +1,4 @@
-"""The phase plate: thin glass of any shape, which bends rays by the gradient of its optical path."""
+"""The phase plate: thin glass of any shape, which deflects rays by the gradient of its optical path."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ class SurfaceDeflection(Deflection):
     """The slopes that a surface adds to rays.
 
     Args:
-        surface: whose optical path bends them.
+        surface: whose optical path deflects rays.
     """
 
     surface: Surface
 
     @property
     def affine(self) -> Affine | None:
-        """A prism or a lens where the surface's slopes are linear in x and y."""
+        """A prism or a lens if the surface's slopes are linear in x and y."""
         return self.surface.affine
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The gradient of the surface's optical path, checked."""
+        """The gradient of the surface's optical path, validated."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         return checked_slopes(self.surface.slopes(x, y), x, y)
 
@@ -51,20 +51,20 @@ class SurfaceDeflection(Deflection):
 
 @dataclass(frozen=True)
 class PhasePlate(Element):
-    """A thin plate that adds an optical path OPL(x, y): rays bend by its gradient, Δs = ∂OPL/∂x, Δt = ∂OPL/∂y.
+    """A thin plate that adds an optical path OPL(x, y): rays are deflected by Δs = ∂OPL/∂x, Δt = ∂OPL/∂y.
 
-    Geometric: a ray bends and is neither split nor delayed. Where diffraction matters is said in
-    docs/elements/phase-plate.md. Aberrations of a lens are a plate of `vcc.surfaces.Zernike` at the lens's z.
+    Geometric optics: a ray is deflected, but neither split nor delayed. docs/elements/phase-plate.md explains when
+    diffraction matters. Aberrations of a lens are a plate of `vcc.surfaces.Zernike` at the lens's z.
 
     Args:
         surface: a `vcc.surfaces.Surface`, or a function of (x, y) in metres (arrays of one shape) that returns
             the slopes (Δs, Δt).
         diameter: of a round opening, metres.
         width: of a rectangular opening, metres.
-        height: of that, metres; None makes it square.
+        height: of a rectangular opening, metres; None makes it square.
 
-    Without a size, a surface known on a sheet only (a height map, a path map, a rough surface) is as large as
-    its sheet, and others have no rim. Outside a plate with a rim it is dark.
+    Without a size, a surface that is defined on a sheet (a height map, a path map, a rough surface) is as large as
+    its sheet, and others have no rim. Outside a rim the plate is opaque.
 
     Raises:
         InputError: a surface of another type, a size of zero or less, a diameter and a width together, a height
@@ -106,7 +106,7 @@ class PhasePlate(Element):
 
     @property
     def _size(self) -> tuple[float, float] | None:
-        """(width, height) of the opening; None where there is no rim."""
+        """(width, height) of the opening; None if there is no rim."""
         if self.diameter is not None:
             return self.diameter, self.diameter
         if self.width is not None:
@@ -116,7 +116,7 @@ class PhasePlate(Element):
         return None
 
     def faces(self) -> Faces:
-        """A deflection, affine where the surface's slopes are linear, and an opening if there is a rim."""
+        """A deflection, affine if the surface's slopes are linear, and an opening if there is a rim."""
         return Faces(deflection=self._deflection(), transmission=self._opening())
 
     def _deflection(self) -> Deflection:
@@ -130,7 +130,7 @@ class PhasePlate(Element):
         return None if self._size is None else Bounded(Open(), *self._size)
 
     def described(self) -> str:
-        """The surface and the opening in words."""
+        """The surface and the opening as text."""
         if isinstance(self.surface, Surface):
             return super().described()
         name = getattr(self.surface, "__name__", type(self.surface).__name__)
@@ -139,5 +139,5 @@ class PhasePlate(Element):
 
 
 def _given_whole_arrays(function: Callable[[Array, Array], Any]) -> Callable[[Array, Array], Any]:
-    """The function called with arrays of one shape, so that (−x/f, −y/f) returns two of that shape."""
+    """The function, called with arrays of one shape, so that (−x/f, −y/f) returns two arrays of that shape."""
     return lambda x, y: function(*np.broadcast_arrays(x, y))

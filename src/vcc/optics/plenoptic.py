@@ -1,4 +1,4 @@
-"""The first algebra of a plenoptic camera: what follows from its lenslets."""
+"""First-order design of a plenoptic camera from its lenslets."""
 
 from __future__ import annotations
 
@@ -79,13 +79,13 @@ class Plenoptic:
 
     @property
     def diameter(self) -> float:
-        """D, of the main lens, whose picture by a lenslet, D·b/d, is as wide as they stand apart."""
+        """D, of the main lens: its image by a lenslet, D·b/d, is as wide as the distance between these images."""
         return self.micro_image * self.to_lenslets / self.gap
 
     @property
     def elements(self) -> tuple[Element, ...]:
-        """The main lens and the lenslets, which have the axis in their middle."""
-        # Of an even number of lenslets two are as far from the axis. Without a number one is on the axis.
+        """The main lens and the lenslets, centred on the axis."""
+        # With an even number, the axis passes between two lenslets. Without a number, one is on the axis.
         counts = self.lenslets or (1, 1)
         down, across = (self.lenslet_pitch / 2 if count % 2 == 0 else 0.0 for count in counts)
         main = Lens(self.focal_length, self.diameter, name="main lens")
@@ -93,7 +93,7 @@ class Plenoptic:
         return main, array
 
     def sensor(self, electronics: Electronics | None) -> Sensor:
-        """Behind the lenslets at their focal length."""
+        """The sensor behind the lenslets, at their focal length."""
         if self.lenslets is not None and self.pixels_per_lenslet is not None:
             rows, columns = (count * self.pixels_per_lenslet for count in self.lenslets)
             pitch = self.micro_image / self.pixels_per_lenslet
@@ -101,6 +101,6 @@ class Plenoptic:
             assert self.sensor_size is not None
             assert self.pixel_pitch is not None
             pitch = self.pixel_pitch
-            # A side of exactly so many pixels has that many, whatever the division rounds to.
+            # Rounding of the division does not reduce the number of pixels if the size is an exact multiple.
             rows, columns = (int(size / pitch * (1 + 1e-9)) for size in self.sensor_size)
         return Sensor(self.to_lenslets + self.gap, (rows, columns), pitch, electronics=electronics)

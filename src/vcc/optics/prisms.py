@@ -1,4 +1,4 @@
-"""Prisms: the thin one, and those of several plane faces that meet in the middle, the biprism and pyramids."""
+"""Prisms: the thin prism, and prisms with several plane faces that meet in the middle, biprism and pyramids."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from vcc.shapes.patterns import Circle
 class Biprism(Element):
     """Two prisms whose bases meet in a line through the middle: Fresnel's biprism.
 
-    Before a camera it shows a point of the scene twice, which makes a stereo camera of it (Lee and Kweon 2000).
-    A face inclined by the angle α, of glass of index n, deflects by about (n − 1)·α.
+    In front of a camera it shows each point of the scene twice, which makes it a stereo camera (Lee and Kweon
+    2000). A face inclined by the angle α, of glass of index n, deflects by about (n − 1)·α.
 
     Args:
-        deflection: δ, a slope: where x > 0, Δs = −δ, and where x < 0, Δs = +δ. Greater than 0, both halves bend
-            towards the line where they meet; less than 0, away from it; 0 does nothing.
-        rotation: of that line, which runs along y at 0, radians, from x towards y.
-        diameter: of a round rim, metres; None lets rays pass at any distance from the axis.
+        deflection: δ, a slope: Δs = −δ for x > 0, and Δs = +δ for x < 0. If it is positive, both halves deflect
+            towards the line where they meet; if negative, away from it; 0 has no effect.
+        rotation: of that line, which is along y at 0, radians, from x towards y.
+        diameter: of a round rim, metres; None for no rim.
 
     Raises:
         InputError: a deflection or rotation that is not finite, a diameter of 0 or less.
@@ -41,20 +41,20 @@ class Biprism(Element):
         _check(self)
 
     def faces(self) -> Faces:
-        """Two facets, each bending along its own direction, and a rim if there is a diameter."""
+        """Two facets, each deflecting along its own direction, and a rim if there is a diameter."""
         return _facets(self, 2)
 
 
 @dataclass(frozen=True)
 class Pyramid(Element):
-    """A pyramid of plane facets around the axis: one picture of the scene through each of them.
+    """A pyramid of plane facets around the axis, each of which forms one image of the scene.
 
     Args:
-        sides: how many facets, 3 to 1000.
-        deflection: δ, a slope: each facet bends light by δ against the direction in which it lies, towards the
-            axis where greater than 0, away from it where less; 0 does nothing.
-        rotation: of the facets, radians, from x towards y; at 0 the middle of a facet lies to the right.
-        diameter: of a round rim, metres; None lets rays pass at any distance from the axis.
+        sides: number of facets, 3 to 1000.
+        deflection: δ, a slope: each facet deflects light by δ against its direction, towards the
+            axis if positive, away from it if negative; 0 has no effect.
+        rotation: of the facets, radians, from x towards y; at 0 the middle of a facet is to the right.
+        diameter: of a round rim, metres; None for no rim.
 
     Raises:
         InputError: another number of sides, a deflection or rotation that is not finite, a diameter of 0 or less.
@@ -67,7 +67,7 @@ class Pyramid(Element):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not (3 <= self.sides <= 1000 and self.sides % 1 == 0):  # 3.0 will do
+        if not (3 <= self.sides <= 1000 and self.sides % 1 == 0):  # 3.0 is accepted
             raise InputError(
                 f"sides of {self.label} is a whole number, 3 to 1000, not {self.sides}; "
                 "two sides make a vcc.Biprism"
@@ -75,7 +75,7 @@ class Pyramid(Element):
         _check(self)
 
     def faces(self) -> Faces:
-        """Facets around the middle, each bending along its own direction, and a rim if there is a diameter."""
+        """Facets around the middle, each deflecting along its own direction, and a rim if there is a diameter."""
         return _facets(self, int(self.sides))
 
 
@@ -99,8 +99,8 @@ def _facets(element: Biprism | Pyramid, number: int) -> Faces:
 class Prism(Element):
     """A thin prism: adds the same slope to every ray, s' = s + δs, t' = t + δt.
 
-    The paper prints its prism matrices (eq. 4) as shears, against its own text; this is the constant
-    deflection that the text describes. A thin wedge of apex angle α and index n deflects by about (n − 1)·α.
+    The paper prints its prism matrices (eq. 4) as shears, in contradiction to its text; this class implements
+    the constant deflection of the text. A thin wedge of apex angle α and index n deflects by about (n − 1)·α.
 
     Args:
         deflection: (δs, δt), dimensionless slopes; positive moves light to the right and down.

@@ -1,4 +1,4 @@
-"""How a thin element scatters light by position: the paper's third category (section 3.2.2, eq. 6)."""
+"""Scattering by a thin element, by position: the paper's third category (section 3.2.2, eq. 6)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 class SheetMap(Value):
     """Numbers that vary over a sheet, given in cells side by side: bilinear between the cells' middles.
 
-    From the middles of the outermost cells outwards, values stay as they are there.
+    Values are constant from the middles of the outermost cells outwards.
 
     Args:
         values: one number a cell, shape (rows, columns), or n maps over the same sheet, (n, rows, columns);
@@ -45,7 +45,7 @@ class SheetMap(Value):
         object.__setattr__(self, "values", values)
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Values at places x, y in metres from the sheet's middle (arrays that broadcast to a shape S).
+        """Values at places x, y in metres relative to the sheet's middle (arrays that broadcast to a shape S).
 
         Returns:
             Shape S for one map, (*S, n) for n maps.
@@ -62,20 +62,20 @@ class SheetMap(Value):
 
 @dataclass(frozen=True)
 class Scatter:
-    """What a scatterer does by position: one kernel, or kernels mixed and stretched over the surface.
+    """The scattering of an element by position: one kernel, or kernels mixed and stretched over the surface.
 
     D(δ | x, y) = Σₙ weightₙ(x, y) · Dₙ(δ / width(x, y)) / width(x, y)².
 
     Args:
         kernels: the kernels Dₙ.
-        weights: the kernels' shares by position, summing to 1: a `SheetMap` of n maps, or a function of
-            (x, y) in metres that returns shape (..., n); None where there is one kernel.
+        weights: the kernels' shares by position, with sum 1: a `SheetMap` of n maps, or a function of
+            (x, y) in metres that returns shape (..., n); None for one kernel.
         width: the factor, 0 or more, by which the kernels are stretched, by position: a `SheetMap`, or a
             function of (x, y) in metres; None stretches nothing.
-        largest_width: the largest value that ``width`` takes.
+        largest_width: the largest value of ``width``.
 
     Raises:
-        InputError: no kernels, what is not a kernel, several kernels without weights, a largest width that is
+        InputError: no kernels, objects of another type, several kernels without weights, a largest width that is
             negative or not finite.
     """
 
@@ -103,7 +103,7 @@ class Scatter:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """(|δs|, |δt|) beyond which no kernel reaches."""
+        """Largest (|δs|, |δt|) of all kernels."""
         reaches = np.array([kernel.reach for kernel in self.kernels]) * self.largest_width
         s, t = reaches.max(axis=0)
         return float(s), float(t)
@@ -115,7 +115,7 @@ class Scatter:
             Shares, shape (*S, n), and widths, shape S.
 
         Raises:
-            InputError: weights or widths of a wrong shape, not finite or negative, weights that do not sum to
+            InputError: weights or widths of a wrong shape, not finite or negative, weights whose sum is not
                 1, a width above ``largest_width``.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))

@@ -29,14 +29,14 @@ class Sensor(Shown):
         pitch: distance between pixel centres, metres: one number or (vertical, horizontal).
         decentre: place (x, y) of the sensor's middle off the axis, metres.
         fill_factor: the share of a pixel's area that is sensitive, above 0 and up to 1: a rectangle of the
-            pixel's own proportions in its middle. A smaller one gathers less light, and sharper samples.
-        electronics: how pixels turn light into numbers, for `vcc.Camera.expose`; None where only irradiance
-            is asked for. Of a sensor with photodiodes, that of one photodiode.
+            pixel's proportions in its middle. A smaller area collects less light, and samples more sharply.
+        electronics: conversion of light into numbers, for `vcc.Camera.expose`; None if only irradiance
+            is needed. For a sensor with photodiodes, that of one photodiode.
         photodiodes: (rows, columns) in each pixel, under its microlens: (1, 2) for dual pixels, (2, 2) for quad pixels.
         microlens: over the photodiodes of each pixel; None: one that images the exit pupil of the camera's stop.
         angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`, in
-            which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are a tile that
-            repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
+            which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are a tile
+            that repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
 
     Raises:
         InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor outside

@@ -1,4 +1,4 @@
-"""The optical train: elements along an axis and a sensor, checked once, and what light meets on its way."""
+"""The optical train: elements along an axis and a sensor, validated once, and the stages that light meets."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ RESPONSE = "response of the pixels"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stage(Brief):
-    """One thing that light meets on its way through a camera.
+    """One stage that light meets on its way through a camera.
 
     Args:
-        element: what it is, or is a part of.
-        z: where it stands, metres (for an inner part of a thick element, where that element begins).
+        element: the element, or the thick element of which this is a part.
+        z: place, metres (for an inner part of a thick element, the place where that element begins).
         approach: rays from just behind the stage before (at first: from the entrance plane) to just before
-            this one, elements' own affine steps included; None of the lenses and prisms, which are faces.
-        faces: what it does, in coordinates centred on the element.
-        arriving: rays from the entrance plane to just before this stage, what is affine on the way folded; what
-            bends rays otherwise (lens arrays, phase plates) and what scatters them is passed over.
-        term: for a factor of the transmission that depends on direction: the stage stands in the term's own plane
-            (`Term.to_plane`), ``approach`` leads there, and that of the next stage leads back.
+            this one, including elements' own affine steps, but not lenses and prisms, which are faces.
+        faces: effect of the stage, in coordinates centred on the element.
+        arriving: rays from the entrance plane to just before this stage, with all affine optics on the way folded;
+            other bending (lens arrays, phase plates) and scattering are ignored.
+        term: for a factor of the transmission that depends on direction: the stage is in the term's own plane
+            (`Term.to_plane`), ``approach`` leads there, and the next stage's leads back.
     """
 
     element: Element
@@ -64,7 +64,7 @@ class Stage(Brief):
     @property
     @cached
     def centred(self) -> Affine | None:
-        """The affine deflection about the element's own middle, on rays of the camera."""
+        """The affine deflection about the element's own middle, on rays in the camera's coordinates."""
         return None if self.faces.affine is None else about(self.element.decentre, self.faces.affine)
 
     @property
@@ -92,7 +92,7 @@ class Stage(Brief):
 
     @contextmanager
     def named(self) -> Iterator[None]:
-        """Errors raised within name the element."""
+        """Add the element's name to errors raised within."""
         try:
             yield
         except InputError as error:
@@ -100,7 +100,7 @@ class Stage(Brief):
 
 
 def touch(one: float, other: float) -> bool:
-    """Whether two places on the axis, metres, are the same but for rounding: to a billionth, or a picometre."""
+    """Whether two places on the axis, metres, are equal except for rounding: to a billionth, or a picometre."""
     return math.isclose(one, other, rel_tol=1e-9, abs_tol=1e-12)
 
 
@@ -110,13 +110,13 @@ def _place(z: float) -> str:
 
 
 def _order(one: Element, other: Element) -> int:
-    """−1 where light meets ``one`` first, 1 where ``other``: by z, and in one plane what is thin first."""
+    """−1 if light meets ``one`` first, 1 if ``other``: sorted by z, thin elements first in one plane."""
     difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
     return int(np.sign(difference))
 
 
 def _check_sensor(sensor: object, elements: Any) -> None:
-    """Refuse what is no sensor, and whatever else people put in its place, each with what to write."""
+    """Raise an error if the sensor is not one; the message corrects common mistakes."""
     if isinstance(elements, str | PathLike):
         raise InputError(f"a camera in a file is opened with vcc.load_camera({str(elements)!r})")
     inside = [each for each in elements if isinstance(each, Sensor)] if isinstance(elements, tuple | list) else []
@@ -135,7 +135,7 @@ def _check_sensor(sensor: object, elements: Any) -> None:
 
 
 def _listed(elements: Any) -> tuple[Element, ...]:
-    """The elements, each of which is one."""
+    """The elements as a tuple, with their types checked."""
     if isinstance(elements, Element):
         raise InputError(f"elements are a list, for one too: write vcc.Camera([{_name(elements)}], sensor)")
     try:
@@ -153,36 +153,36 @@ def _name(element: Element) -> str:
 
 
 def _called(thing: object) -> str:
-    """What a thing is, for an error: an instance by its class, a class by its name."""
+    """Name an object in an error: an instance by its class, a class by its name."""
     return f"the class {thing.__name__} itself" if isinstance(thing, type) else f"a {type(thing).__name__}"
 
 
 def _distance(start: float, end: float) -> float:
-    """The way along the axis, metres; 0 where only rounding lies between."""
+    """Distance along the axis, metres; 0 if it is only rounding."""
     return 0.0 if touch(start, end) else end - start
 
 
 def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
-    """A map of rays given in coordinates centred on ``middle``, on rays of the camera."""
+    """A map of rays in coordinates centred on ``middle``, converted to the camera's coordinates."""
     x, y = middle
     return Affine.translation(x, y, 0, 0) @ ray_map @ Affine.translation(-x, -y, 0, 0)
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Train(Value, Shown):
-    """Elements along an axis and a sensor behind them: all that is true of a camera without computing a picture.
+    """Elements along an axis and a sensor behind them: a camera without the methods that compute images.
 
-    A light field given to it is taken to lie at the entrance plane, z = 0. Trains of equal elements and sensors
+    A light field is given at the entrance plane, z = 0. Trains of equal elements and sensors
     are equal, and can be keys of a cache.
 
     Args:
         elements: in any order; kept sorted by z. Elements at the same z commute.
-        sensor: where the picture is recorded; there is no camera without one.
-        name: what pictures say made them, that of the camera's file where there is one; not compared.
+        sensor: records the image; required.
+        name: recorded in images as their source, the name of the camera's file if there is one; not compared.
 
     Raises:
-        InputError: no sensor, or what is no element; an element before the entrance plane or behind the sensor;
-            two elements of one name.
+        InputError: no sensor, or an object that is not an element; an element before the entrance plane or behind
+            the sensor; two elements with the same name.
     """
 
     elements: tuple[Element, ...]
@@ -357,7 +357,7 @@ class Train(Value, Shown):
 
     @property
     def stages(self) -> tuple[Stage, ...]:
-        """All that light meets on its way to the sensor, in order."""
+        """All stages that light meets on its way to the sensor, in order."""
         return self._path[0]
 
     @property
@@ -372,13 +372,13 @@ class Train(Value, Shown):
         return self.approach_to_sensor @ behind
 
     def rays_at(self, z: float, *, before: bool = False) -> Affine:
-        """The map of rays from the entrance plane to the plane at z, all affine optics on the way folded.
+        """The map of rays from the entrance plane to the plane at z, with all affine optics on the way folded.
 
-        What bends rays otherwise (lens arrays, phase plates) and what scatters them is passed over.
+        Other bending (lens arrays, phase plates) and scattering are ignored.
 
         Args:
             z: place on the axis, metres, 0 or more.
-            before: whether to stop before the elements that stand exactly at z, rather than behind them.
+            before: whether to stop before the elements exactly at z, rather than behind them.
 
         Raises:
             InputError: z is before the entrance plane, or inside a thick element.

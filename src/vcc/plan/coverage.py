@@ -78,7 +78,7 @@ class AskedLight(Brief):
 
     Args:
         path: of the camera.
-        aimed: bounds of the light; None if all light comes from one place.
+        aimed: bounds of the light; None if nothing bounds the rays.
         by_views: whether the grid of views is the bound, because no stop is.
     """
 

@@ -61,23 +61,23 @@ class How(Value, Shown):
             light field's ``disparity``, which is estimated first if not given: no ghosts at any depth, at the
             cost that `vcc.Camera.explain` reports, for NumPy arrays; ``"none"`` never interpolates.
         scene_distance: the distance in metres of the scene before the entrance plane, used for the interpolation
-            between views; None uses the range of distances given with or measured in the light field.
+            between views; None takes the range of distances given with or measured in the light field.
         refine: footprints: ``"auto"`` divides cells and samples if a mask is finer than they are, at a cost
             that `vcc.Camera.explain` reports; a number from 2 to 8 sets the largest number of parts each way of
             samples and of cells of views, but divides at least as far as "auto"; 1 divides nothing, and the error
             is then not reported.
         samples: rays a pixel, rounded up to a power of two (behind a main lens and lenslets: for each lenslet that
-            the pixel sees); None uses 64, with a warning if the error exceeds 1 % of the brightest pixel.
+            the pixel sees); None takes 64, whose error causes a warning above 1 % of the brightest pixel.
         tolerance: double the samples until the estimated sampling error of the image, root mean square, is at
             most this share of its mean; None does not.
         seed: of the points of the rays. The same seed gives the same image, on any number of threads.
         engine: ``"numba"`` (default for NumPy arrays), ``"array_api"`` (default for PyTorch, JAX and other arrays:
             carries gradients), ``"cuda"`` (on an NVIDIA GPU; extra ``gpu``; default for samples that
             `vcc.LightField.on_gpu` keeps there) or ``"reference"`` (slow; defines what is correct).
-        threads: number of concurrent threads; None uses as many as there are cores for this process. The image
+        threads: number of concurrent threads; None takes as many as there are cores for this process. The image
             does not depend on it.
         memory_limit: for a stored light field, bytes for its pieces, the image and the engine together; None
-            uses a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time with rays,
+            takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time with rays,
             because all rays are traced for each piece.
 
     Raises:

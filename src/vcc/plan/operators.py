@@ -284,7 +284,7 @@ class SharpenViews(Value):
     """Each view filtered along k and along l, to compensate beforehand for linear look-ups.
 
     A ray interpolates linearly between the samples of a view. Averaged over all places within a sample, this
-    filters the view with a tent, which takes 1 − sinc²(f) of a cosine of f cycles a sample: 3 % at 0.1, 7 % at
+    filters the view with a tent, which removes 1 − sinc²(f) of a cosine of f cycles a sample: 3 % at 0.1, 7 % at
     0.15. If a sample is itself a mean over its pixel, light that is averaged over a sensor's pixel is averaged a
     second time, and loses 1 − sinc(f) more. Beyond a view's border its last samples are repeated, so that
     uniform views stay uniform.

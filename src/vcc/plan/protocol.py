@@ -218,8 +218,7 @@ class Engine(Protocol):
     def prepared_back(
         self, before: Sequence[Any], values: Any, threads: int, *, written_over: bool = False
     ) -> Any:
-        """The transpose of `prepared`: from weights of the samples that a core reads to weights of the given
-        samples.
+        """The transpose of `prepared`: from weights of a core's samples to weights of the given samples.
 
         Applies the operators' ``transpose``, the last operator first. Each is the adjoint of its operator on real
         numbers: rounding to integers and the scale of the integers are ignored. If 8-bit samples are stored as

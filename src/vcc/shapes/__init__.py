@@ -1,1 +1,1 @@
-"""Functions of position: what masks let through, how diffusers scatter, what plates add, where cells lie."""
+"""Functions of position: transmission of masks, scattering of diffusers, surfaces of plates, lattices of cells."""

@@ -1,4 +1,4 @@
-"""Surfaces known on a sheet only: measured, computed, or rough at random; a spline between their points."""
+"""Surfaces defined on a sheet: measured, computed, or random rough ones, with a spline between their points."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from vcc.shapes.patterns import is_grid
 from vcc.shapes.surface import Array, Surface
 
 POINTS_PER_CORRELATION_LENGTH = 4
-"""Of a rough surface. Its spectrum exp(−π²f²l²) has fallen to 1e-17 at the highest frequency that they hold."""
+"""Points of a rough surface. Its spectrum exp(−π²f²l²) is 1e-17 at the highest frequency that they resolve."""
 LARGEST_GRID = 4097
-"""Points a side of a rough surface, on its sheet: 128 MiB of float64, and seconds to make."""
+"""Points a side of a rough surface, on its sheet: 128 MiB of float64, and seconds to compute."""
 
 
 class Sheet(Surface):
-    """A surface known on a grid of points of a sheet, a spline between them, and nothing (flat) beyond.
+    """A surface defined on a grid of points of a sheet, with a spline between them, and flat outside.
 
     The interpolant is the bicubic spline through the points, so that slopes and their derivatives are
-    continuous. It is made when first asked for.
+    continuous. It is computed on first use.
     """
 
     width: float
@@ -69,7 +69,7 @@ class Sheet(Surface):
 
     @property
     def affine(self) -> Affine | None:
-        """Nothing where the sheet is flat."""
+        """The identity if the sheet is flat."""
         return Affine.identity() if self._flat else None
 
     @property
@@ -88,10 +88,10 @@ class Sheet(Surface):
 
     def _on_sheet(self, spline: Any, x: ArrayLike, y: ArrayLike) -> Array:
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        # A millionth more, so that a place on the edge is on the sheet whatever rounding did to it
+        # A millionth larger, so that a place on the edge is on the sheet despite rounding
         inside = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
         if is_grid(x, y) and (np.diff(x[0]) > 0).all() and (np.diff(y[:, 0]) > 0).all():
-            # The spline is a product along both axes: 50 times as fast as place by place
+            # The spline is a product along both axes: 50 times as fast as separate places
             return np.where(inside, spline(y[:, 0], x[0], grid=True), 0.0)
         x, y = np.broadcast_arrays(x, y)
         values = np.zeros(x.shape)
@@ -99,19 +99,19 @@ class Sheet(Surface):
         return values
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
-        """See `Surface`; here to the optical paths that are known."""
+        """See `Surface`; for the given optical paths."""
         known_y, known_x, _ = self._samples()
         knots_y, knots_x, _ = self._spline.tck
         on_sheet = (np.abs(x) <= self.size[0] * 0.500001) & (np.abs(y) <= self.size[1] * 0.500001)
         along_x, along_y = (np.where(on_sheet, each, 0.0) for each in weights)
         total = _basis(knots_y, y, 0).T @ along_x @ _basis(knots_x, x, 1)
         total += _basis(knots_y, y, 1).T @ along_y @ _basis(knots_x, x, 0)
-        # The coefficients are what makes the spline pass through the points that are known.
+        # The coefficients are such that the spline passes through the given points.
         down = np.linalg.solve(_basis(knots_y, known_y, 0).T, total)
         return np.asarray(np.linalg.solve(_basis(knots_x, known_x, 0).T, down.T).T)
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The largest coefficients of the slopes' splines in the rectangle, which no spline can exceed.
+        """The largest coefficients of the slopes' splines in the rectangle, which bound the splines.
 
         (The convex hull property of B-splines; de Boor, A Practical Guide to Splines.)
         """
@@ -139,16 +139,16 @@ def _coefficient_bound(spline: Any, half_width: float, half_height: float) -> fl
 
 
 class _Table(Sheet):
-    """A surface known at the middles of square or rectangular cells side by side, which fill its sheet."""
+    """A surface with values at the middles of square or rectangular cells that fill its sheet."""
 
     @property
     @abc.abstractmethod
     def _cells(self) -> Array:
-        """What is known of each cell, (rows, columns)."""
+        """The value of each cell, (rows, columns)."""
 
     @property
     def factor(self) -> float:
-        """The optical path for 1 of what is known."""
+        """The optical path per unit of the values."""
         return 1.0
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
@@ -169,7 +169,7 @@ class _Table(Sheet):
         return y, x, self.factor * self._cells
 
     def compared(self) -> tuple[Any, ...]:
-        """What equal tables have in common: the size, since a height that is left out makes the cells square."""
+        """Properties to compare: the size, because a missing height makes the cells square."""
         return self._cells, self.size, self.factor
 
     def __eq__(self, other: object) -> bool:
@@ -187,7 +187,7 @@ class _Table(Sheet):
         return f"{rows}×{columns} points, {short(width)} × {short(height)}"
 
     def described(self) -> str:
-        """The number of points and the size of the sheet in words."""
+        """The number of points and the size of the sheet as text."""
         return f"{kind_in_words(type(self))} ({self._in_words})"
 
     def __repr__(self) -> str:
@@ -200,7 +200,9 @@ class _Table(Sheet):
 class HeightMap(_Table):
     """Glass of measured or designed height h: OPL = (n − 1)·h, sampled on a grid.
 
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
+
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
     Args:
         heights: thickness of the glass, metres, (rows, columns), row 0 at the top; 4×4 or more.
@@ -234,7 +236,7 @@ class HeightMap(_Table):
         return self.refractive_index - 1
 
     def described(self) -> str:
-        """The number of points, the size of the sheet and the glass in words."""
+        """The number of points, the size of the sheet and the glass as text."""
         return f"height map ({self._in_words}, refractive index {self.refractive_index:g})"
 
 
@@ -242,7 +244,9 @@ class HeightMap(_Table):
 class PathMap(_Table):
     """Optical path lengths sampled on a grid, from another program or a wavefront measurement.
 
-    The sheet is ``width`` wide and bounds a plate made of it; values stand at the middles of its cells.
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
+
+    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
     Args:
         paths: optical path lengths, metres, (rows, columns), row 0 at the top; 4×4 or more.
@@ -274,19 +278,19 @@ class Rough(Sheet):
 
     Its slopes are Gaussian too, with the variance (n − 1)²·2σ²/l² along each axis, which is −(n − 1)²·∂²C/∂x² at 0
     (Papoulis, Probability, Random Variables and Stochastic Processes, on derivatives of stationary processes).
-    It is made when first asked for: white noise from NumPy's generator, filtered by exp(−2r²/l²), which has that
+    It is computed on first use: white noise from NumPy's generator, filtered by exp(−2r²/l²), which produces this
     correlation. The same parameters and seed give the same surface.
 
     Args:
         height_rms: σ, root mean square of the heights, metres.
-        correlation_length: l, where the correlation has fallen to 1/e, metres.
+        correlation_length: l, distance at which the correlation has fallen to 1/e, metres.
         width: of the sheet, metres; it bounds a plate made of it.
         height: of the sheet, metres; None makes it square.
         refractive_index: n of the glass, more than 1.
         seed: of the random numbers, an integer of 0 or more.
 
     Raises:
-        InputError: lengths of zero or less (σ may be 0), no glass (n ≤ 1), a seed that is no such integer, or a
+        InputError: lengths of zero or less (σ may be 0), no glass (n ≤ 1), an invalid seed, or a
             sheet so much larger than the correlation length that its grid would be too large.
     """
 
@@ -320,8 +324,8 @@ class Rough(Sheet):
 
     @property
     def grid(self) -> tuple[int, int]:
-        """(rows, columns) of points at which the surface is made, the outermost 16 beyond each edge."""
-        # A millionth of a step less: a sheet of a whole number of steps is not one step longer by rounding
+        """(rows, columns) of points at which the surface is computed, with 16 points beyond each edge."""
+        # A millionth of a step less: a sheet of an integer number of steps does not get one more step by rounding
         rows, columns = (
             2 * (math.ceil(length / (2 * self._step) - 1e-6) + _MARGIN) + 1 for length in self.size[::-1]
         )
@@ -333,24 +337,24 @@ class Rough(Sheet):
 
     @property
     def slope_rms(self) -> float:
-        """Root mean square of Δs, and of Δt, over all such surfaces: (n − 1)·√2·σ/l."""
+        """Root mean square of Δs, and of Δt, over the ensemble of surfaces: (n − 1)·√2·σ/l."""
         return (self.refractive_index - 1) * math.sqrt(2) * self.height_rms / self.correlation_length
 
     @property
     def affine(self) -> Affine | None:
-        """Nothing where the glass is smooth."""
+        """The identity if the glass is smooth."""
         return Affine.identity() if self.height_rms == 0 else None
 
     def _samples(self) -> tuple[Array, Array, Array]:
         from scipy.ndimage import convolve1d
 
-        # exp(−2·3²) = 1.5e-8: what lies further out than 3 l does not show in float32
+        # exp(−2·3²) = 1.5e-8: contributions from beyond 3 l are invisible in float32
         reach = 3 * POINTS_PER_CORRELATION_LENGTH
         kernel = np.exp(-2 * (np.arange(-reach, reach + 1) / POINTS_PER_CORRELATION_LENGTH) ** 2)
-        kernel /= np.sqrt(np.sum(kernel**2))  # so that noise of variance 1 stays so
+        kernel /= np.sqrt(np.sum(kernel**2))  # so that noise keeps variance 1
         rows, columns = self.grid
         heights = _noise(self.seed, rows // 2 + reach, columns // 2 + reach)
-        # Only points with the whole kernel inside the noise are kept: no edge, no wrapping around.
+        # Only points with the whole kernel inside the noise are kept: no edge effects, no wrapping around.
         heights = convolve1d(heights, kernel, axis=0)[reach:-reach]
         heights = convolve1d(heights, kernel, axis=1)[:, reach:-reach]
         y, x = (
@@ -361,14 +365,14 @@ class Rough(Sheet):
 
 
 _MARGIN = 16
-"""Points of a rough surface beyond each edge of its sheet. What a spline does at its ends falls by 0.27 from point
-to point: on the sheet, 1e-9 of it is left, and a point more or less does not show."""
+"""Points of a rough surface beyond each edge of its sheet. End effects of a spline decay by 0.27 from point
+to point: on the sheet, 1e-9 remains, so that one point more or less is invisible."""
 
 
 def _noise(seed: int, rows: int, columns: int) -> Array:
-    """Normal numbers of variance 1 at places −rows … rows, −columns … columns; larger tables go on from smaller.
+    """Normal numbers of variance 1 at places −rows … rows, −columns … columns; larger tables contain smaller ones.
 
-    So a surface stays the same where its sheet becomes larger or its grid finer, and its sizes can be learned.
+    So a surface does not change if its sheet becomes larger or its grid finer, and its sizes can be learned.
     """
     table = np.empty((2 * rows + 1, 2 * columns + 1))
     for row in range(-rows, rows + 1):

@@ -1,4 +1,4 @@
-"""Densities on a lattice: how much of a kernel each of its places takes, by linear interpolation between them."""
+"""Densities on a lattice: the share of a kernel at each lattice point, for linear interpolation between them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FULL_STEP = 1e-9
-"""Parts of a lattice step that are rounding."""
+"""Share of a lattice step that counts as rounding."""
 
 
 def axes_of(matrix: Array, reach: tuple[float, float]) -> tuple[int, int] | None:
-    """Which axis of slope (0: s, 1: t) moves along x and which along y; None where one moves along both."""
+    """The axis of slope (0: s, 1: t) that moves along x, and along y; None if one moves along both."""
     moved = np.abs(matrix) * np.array(reach)
     for axes in ((0, 1), (1, 0)):
         if moved[0, 1 - axes[0]] <= FULL_STEP and moved[1, 1 - axes[1]] <= FULL_STEP:
@@ -29,7 +29,7 @@ def separable(
     half_width: int,
     half_height: int,
 ) -> Array | None:
-    """The weights of a kernel that is even and a product of its axes, where each axis keeps to one of the lattice.
+    """The weights of an even kernel that is a product of its axes, if these lie along the lattice's axes.
 
     Since |δ − x|'' = 2·Dirac(δ − x), the mean of a tent is a second difference of means of distances:
     E tent(n − x) = ½ (E|x − n − 1| − 2 E|x − n| + E|x − n + 1|).
@@ -59,8 +59,8 @@ def cells_on_lattice(cells: int, step: float, half: int) -> Array:
     """Means of the tents of a lattice over cells side by side around 0: shape (2·half + 1, cells).
 
     Args:
-        cells: how many.
-        step: width of a cell in lattice steps; negative where cells are counted against the lattice.
+        cells: number of cells.
+        step: width of a cell in lattice steps; negative if cells are counted in the opposite direction.
         half: lattice places run from −half to half.
     """
     place = np.arange(-half, half + 1.0)[:, None]
@@ -70,16 +70,16 @@ def cells_on_lattice(cells: int, step: float, half: int) -> Array:
         x = np.clip(x, -1, 1)
         return x - x * np.abs(x) / 2
 
-    if abs(step) < 1e-6:  # differences of the integral would be rounding: cells are points
+    if abs(step) < 1e-6:  # differences of the integral would be rounding errors: cells are treated as points
         return np.asarray(np.maximum(1 - np.abs((edges[1:] + edges[:-1]) / 2 - place), 0.0))
     return np.asarray(np.diff(tent_integral(edges - place), axis=1) / np.diff(edges))
 
 
 def deposited(places: Array, shares: Array, half_width: int, half_height: int) -> Array:
-    """Points laid on a lattice, each shared between the four lattice points around it.
+    """Points on a lattice, each divided among the four lattice points around it.
 
     Args:
-        places: (x, y) in lattice steps from the middle, shape (n, 2).
+        places: (x, y) in lattice steps relative to the middle, shape (n, 2).
         shares: of the points, shape (n,).
         half_width: of the lattice, steps.
         half_height: of the lattice, steps.
@@ -104,7 +104,7 @@ def deposited(places: Array, shares: Array, half_width: int, half_height: int) -
 
 
 def refined(coarse: Array, factor: int) -> Array:
-    """Weights on a lattice ``factor`` times as fine, interpolated linearly: their sum and mean stay."""
+    """Weights on a lattice ``factor`` times as fine, interpolated linearly: their sum and mean are unchanged."""
 
     def finer(places: int) -> Array:
         half = places // 2

@@ -1,7 +1,7 @@
-"""Scatter kernels: how a diffuser spreads a ray over slopes (paper, section 3.2.2).
+"""Scatter kernels: the distribution of a ray over slopes by a diffuser (paper, section 3.2.2).
 
 A kernel D(δs, δt) is the share of light that leaves with its slope changed by (δs, δt); its integral is 1, so
-that light is spread and none is lost.
+that light is redistributed and none is lost.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from vcc.shapes.kernel_weights import FULL_STEP, axes_of, cells_on_lattice, depo
 Array = NDArray[np.float64]
 
 SUM_TOLERANCE = 1e-6
-"""A kernel whose shares sum to 1 within this is taken as it is; float32 shares are that good."""
+"""A kernel is used unchanged if its shares sum to 1 within this; float32 shares are accurate enough."""
 LARGEST_WEIGHTS = 8192
-"""Most steps of a lattice that a kernel may cover: its weights then take 512 MiB."""
+"""Largest number of lattice steps that a kernel may cover: its weights then take 512 MiB."""
 CUT = 4.0
-"""A Gaussian ends at this many standard deviations along each axis."""
+"""A Gaussian is cut at this many standard deviations along each axis."""
 FINEST_LATTICE = 512
-"""A kernel that covers more steps than this is worked out on a coarser lattice, then interpolated."""
+"""A kernel that covers more steps than this is computed on a coarser lattice, then interpolated."""
 
 
 class Kernel(Shown, abc.ABC):
@@ -43,10 +43,10 @@ class Kernel(Shown, abc.ABC):
 
     @abc.abstractmethod
     def deflections(self, xi: Array, eta: Array) -> tuple[Array, Array]:
-        """Changes of slope (δs, δt) for places (ξ, η) of the unit square, which they map onto the kernel.
+        """Changes of slope (δs, δt) for places (ξ, η) of the unit square: a map from the square to the kernel.
 
-        Equal areas of the square go to equal shares of light: evenly spread (ξ, η) give deflections of the
-        kernel's density (inverse transform sampling).
+        Equal areas of the square are mapped to equal shares of light: evenly spread (ξ, η) become deflections
+        with the kernel's density (inverse transform sampling).
         """
 
     @abc.abstractmethod
@@ -54,7 +54,7 @@ class Kernel(Shown, abc.ABC):
         """D at changes of slope (s, t), per unit of slope squared; it integrates to 1."""
 
     def quadrature(self, points: int = 256) -> tuple[Array, Array]:
-        """Changes of slope (n, 2) and their shares (n,), which sum to 1: the kernel as a sum of that many rays.
+        """Changes of slope (n, 2) and their shares (n,), which sum to 1: the kernel as a sum of n rays.
 
         Args:
             points: along each axis of the unit square; the square's cells carry equal shares.
@@ -73,21 +73,22 @@ class Kernel(Shown, abc.ABC):
         return half_height, half_width
 
     def weights(self, steps_from_slopes: ArrayLike, beside: tuple[int, int] | None = None) -> Array:
-        """The kernel on a lattice: what a convolution of samples that are interpolated linearly needs.
+        """The kernel on a lattice: the weights for a convolution of samples that are interpolated linearly.
 
-        Entry [dy, dx], counted from the middle, is ∫ D(δ) tent(dx − x) tent(dy − y) dδ with
+        Entry [dy, dx], relative to the middle, is ∫ D(δ) tent(dx − x) tent(dy − y) dδ with
         (x, y) = ``steps_from_slopes`` · (δs, δt) and tent(a) = max(0, 1 − |a|). The entries sum to 1 and their
-        mean is the kernel's. What falls between lattice points is shared by its neighbours, which adds 1/6 step²
+        mean is the kernel's. Light between lattice points is divided among its neighbours, which adds 1/6 step²
         to the variance of a kernel wider than a step or two (and never more than 1/4).
 
         Args:
             steps_from_slopes: lattice steps per slope, 2×2: [[x/δs, x/δt], [y/δs, y/δt]].
-            beside: (b, a), rows and columns of the lattice on each side of its middle; None: `steps_beside`.
+            beside: (b, a), rows and columns of the lattice on each side of its middle; None:
+                `half_width_in_steps`.
 
         Returns:
-            Shape (2b+1, 2a+1), float64, wide enough for the whole kernel; right to about 1e-5 of their sum, and
-            to rounding where a kernel has a closed form. One without that covers more than `FINEST_LATTICE` steps
-            has its edges softened by some 1/500 of its width.
+            Shape (2b+1, 2a+1), float64, wide enough for the whole kernel; accurate to about 1e-5 of their sum, and
+            to rounding if the kernel has a closed form. A kernel without one that covers more than
+            `FINEST_LATTICE` steps has its edges softened by about 1/500 of its width.
 
         Raises:
             InputError: a matrix that is not 2×2 finite numbers, or a kernel over more than `LARGEST_WEIGHTS`
@@ -112,11 +113,11 @@ class Kernel(Shown, abc.ABC):
         return deposited(slopes @ matrix.T, shares, half_width, half_height)
 
     def _closed_weights(self, matrix: Array, half_width: int, half_height: int) -> Array | None:
-        """The weights in closed form; None where there is none for this matrix."""
+        """The weights in closed form; None if there is none for this matrix."""
         return None
 
     def described(self) -> str:
-        """The kernel in words."""
+        """The kernel as text."""
         name = kind_in_words(type(self)).removesuffix(" kernel")
         return with_parameters(name, parameters_in_words(self))
 
@@ -125,11 +126,11 @@ class Kernel(Shown, abc.ABC):
 class Gaussian(Kernel):
     """A normal distribution of slopes, cut at four standard deviations along each axis and renormalised.
 
-    The cut takes 6.3e-5 of each axis' light, which is shared out over the rest; the standard deviation of what is
-    left is ``sigma`` times 0.99946.
+    The cut removes 6.3e-5 of each axis' light, which is distributed over the rest; the standard deviation of the
+    result is ``sigma`` times 0.99946.
 
     Args:
-        sigma: standard deviation in slope, along both axes alike or (s, t).
+        sigma: standard deviation in slope, one number for both axes or (s, t).
 
     Raises:
         InputError: a standard deviation of zero or less, or not finite.
@@ -162,7 +163,7 @@ class Gaussian(Kernel):
         return CUT * s, CUT * t
 
     def deflections(self, xi: Array, eta: Array) -> tuple[Array, Array]:
-        """The truncated normal's inverse distribution function, axis by axis: monotone in each."""
+        """The truncated normal's inverse distribution function along each axis: monotone in each."""
         from scipy.special import ndtr, ndtri
 
         outside = ndtr(-CUT)
@@ -205,7 +206,7 @@ class Gaussian(Kernel):
 
 @dataclass(frozen=True)
 class TopHat(Kernel):
-    """Light spread evenly over a disc or a square of slopes.
+    """Light spread uniformly over a disc or a square of slopes.
 
     Args:
         width: full width in slope: the disc's diameter or the square's side.
@@ -228,7 +229,7 @@ class TopHat(Kernel):
         return self.width / 2, self.width / 2
 
     def deflections(self, xi: Array, eta: Array) -> tuple[Array, Array]:
-        """The unit square scaled, or laid on the disc; monotone in each of ξ and η."""
+        """The unit square scaled, or mapped to the disc; monotone in each of ξ and η."""
         if self.shape == "square":
             return self.width * (np.asarray(xi) - 0.5), self.width * (np.asarray(eta) - 0.5)
         radius, cosine, sine = _on_disc(xi, eta)
@@ -246,7 +247,7 @@ class TopHat(Kernel):
         """Changes of slope (n, 2), on circles or in rows, and their shares (n,), which sum to 1.
 
         Args:
-            points: about so many along each axis.
+            points: approximate number along each axis.
         """
         if self.shape == "square":
             return super().quadrature(points)
@@ -264,18 +265,19 @@ class TopHat(Kernel):
 
 @dataclass(frozen=True, repr=False)
 class Radial(Brief, Kernel):
-    """A round kernel: a density D(r) that depends on the change of slope r = √(δs² + δt²) only.
+    """A round kernel: a density D(r) that depends only on the change of slope r = √(δs² + δt²).
 
     Args:
-        radii: changes of slope at which the density is given, rising from 0. Two values at (almost) one place make
-            a step.
-        profile: the density at them, per slope², 0 or more; linear in between and zero beyond the last radius.
-            Its integral ∫ D(r) 2πr dr must be 1.
-        normalise: divide the profile by its integral instead, so that it needs to be right in shape only.
+        radii: changes of slope at which the density is given, rising from 0. Two values at (almost) the same
+            radius make a step.
+        profile: the density at the radii, per slope², 0 or more; linear in between and zero beyond the last
+            radius. Its integral ∫ D(r) 2πr dr must be 1.
+        normalise: divide the profile by its integral, so that only its shape matters.
 
     Raises:
-        InputError: not as many densities as radii, fewer than two, radii that do not rise from 0, densities that
-            are negative, not finite or all zero, or an integral other than 1 without ``normalise``.
+        InputError: different numbers of densities and radii, fewer than two, radii that do not rise from 0,
+            densities that are negative, not finite or all zero, or an integral other than 1 without
+            ``normalise``.
     """
 
     radii: tuple[float, ...]
@@ -309,7 +311,7 @@ class Radial(Brief, Kernel):
         return self.radii[-1], self.radii[-1]
 
     def deflections(self, xi: Array, eta: Array) -> tuple[Array, Array]:
-        """The unit square laid on a disc, then each radius moved to where it encloses the same share of light."""
+        """The unit square mapped to a disc, then radii moved so that they enclose the same shares of light."""
         radius, cosine, sine = _on_disc(xi, eta)
         radius = self._radius_with(radius * radius)
         return radius * cosine, radius * sine
@@ -332,7 +334,7 @@ class Radial(Brief, Kernel):
         def content(r: Array) -> Any:
             return math.pi * base * (r * r - inner * inner) + 2 * math.pi / 3 * slope * (r**3 - inner**3)
 
-        # Newton's method, kept within the bracket [low, high] by halving it where a step leaves it.
+        # Newton's method, with bisection of the bracket [low, high] if a step leaves it.
         low, high = inner, outer
         radius = 0.5 * (inner + outer)
         for _ in range(60):
@@ -357,24 +359,24 @@ class Radial(Brief, Kernel):
         """Changes of slope (n, 2) on circles, and their shares (n,), which sum to 1.
 
         Args:
-            points: about so many along each axis.
+            points: approximate number along each axis.
         """
         return _on_circles(np.array(self.radii), np.array(self.profile), points)
 
     def described(self) -> str:
-        """The reach and the number of radii in words."""
+        """The reach and the number of radii as text."""
         return f"radial ({len(self.radii)} radii up to {self.radii[-1]:g})"
 
 
 @dataclass(frozen=True, eq=False)
 class Samples(Value, Kernel):
-    """A kernel from an array, measured or computed: even within each cell of the array.
+    """A kernel from an array, measured or computed: uniform within each cell of the array.
 
     Args:
-        values: the share of light that falls into each cell, shape (rows, columns): rows are δt, columns δs, the
-            array's middle is δ = 0. They sum to 1.
+        values: the share of light in each cell, shape (rows, columns): rows are δt, columns δs, the
+            array's middle is δ = 0. Their sum is 1.
         slope_pitch: width of the square cells in slope.
-        normalise: divide the values by their sum instead.
+        normalise: divide the values by their sum.
 
     Raises:
         InputError: not 2-D, empty, values that are negative, not finite or all zero, a sum other than 1 (by more
@@ -402,11 +404,11 @@ class Samples(Value, Kernel):
         return columns * self.slope_pitch / 2, rows * self.slope_pitch / 2
 
     def deflections(self, xi: Array, eta: Array) -> tuple[Array, Array]:
-        """η picks δt by the rows' shares, ξ then δs by the shares within the row; monotone in each of them."""
+        """η selects δt by the rows' shares, ξ then δs by the shares within the row; monotone in each of them."""
         xi, eta = np.broadcast_arrays(np.asarray(xi, dtype=np.float64), np.asarray(eta, dtype=np.float64))
         rows, columns = self.values.shape
         row, down = _picked(self.values.sum(axis=1), eta)
-        # Each row's running shares, lifted by the row's number: one sorted list, searched once.
+        # The cumulative shares of each row plus the row's number: one sorted list, searched once.
         sums = self.values.sum(axis=1, keepdims=True)
         shares = np.divide(self.values, sums, out=np.zeros_like(self.values), where=sums > 0)
         running = np.minimum(np.cumsum(shares, axis=1), 1.0)
@@ -423,7 +425,7 @@ class Samples(Value, Kernel):
         )
 
     def density(self, s: ArrayLike, t: ArrayLike) -> Array:
-        """The share of the cell that holds a change of slope, over the cell's area; zero outside."""
+        """The share of the cell at a change of slope, divided by the cell's area; zero outside."""
         rows, columns = self.values.shape
         column = np.floor(np.asarray(s, dtype=np.float64) / self.slope_pitch + columns / 2)
         row = np.floor(np.asarray(t, dtype=np.float64) / self.slope_pitch + rows / 2)
@@ -435,7 +437,7 @@ class Samples(Value, Kernel):
         """Changes of slope (n, 2) at the middles of cells and their shares (n,), which sum to 1.
 
         Args:
-            points: along each axis; where the array has fewer cells, they are divided evenly.
+            points: along each axis; if the array has fewer cells, they are divided evenly.
         """
         rows, columns = self.values.shape
         parts = max(1, -(-points // max(rows, columns)))
@@ -463,7 +465,7 @@ class Samples(Value, Kernel):
         return np.asarray(down @ shares @ across.T)
 
     def described(self) -> str:
-        """The number of cells and their pitch in words."""
+        """The number of cells and their pitch as text."""
         rows, columns = self.values.shape
         return f"{rows}×{columns} samples (slope pitch {self.slope_pitch:g})"
 
@@ -476,7 +478,7 @@ class Samples(Value, Kernel):
 
 
 def _check_densities(what: str, values: Array) -> None:
-    """Refuse what is negative, not a number or infinite somewhere, or zero everywhere."""
+    """Raise an error if values are negative, NaN or infinite somewhere, or zero everywhere."""
     checks.all_finite(what, values)
     checks.none_negative(what, values)
     if not values.any():
@@ -484,7 +486,7 @@ def _check_densities(what: str, values: Array) -> None:
 
 
 def _normalised(what: str, values: Array, total: float, normalise: bool, sums_to: str) -> Array:
-    """Values whose sum or integral is 1: divided by it where that is asked for, else refused if it is not."""
+    """Values whose sum or integral is 1: divided by it if requested, else an error if it is not 1."""
     if not normalise and abs(total - 1) > SUM_TOLERANCE:
         raise InputError(
             f"{what} {sums_to} {total:.9g}, and must to 1, or light would be made or lost: divide it by that, or "
@@ -512,14 +514,14 @@ def _disc_integrals(radii: Array, profile: Array) -> Array:
 
 
 def _on_disc(xi: ArrayLike, eta: ArrayLike) -> tuple[Array, Array, Array]:
-    """Radius, and cosine and sine of the angle, of the unit square's points laid on the unit disc.
+    """Radius, and cosine and sine of the angle, of the unit square's points mapped to the unit disc.
 
-    Equal areas go to equal areas, squares around the middle to circles, and neighbours stay neighbours
+    Equal areas are mapped to equal areas, squares around the middle to circles, and neighbours to neighbours
     (Shirley and Chiu 1997, "A low distortion map between disk and square").
     """
     a, b = np.broadcast_arrays(2 * np.asarray(xi, dtype=np.float64) - 1, 2 * np.asarray(eta, dtype=np.float64) - 1)
     sideways = np.abs(a) >= np.abs(b)
-    radius = np.where(sideways, a, b)  # signed: the angle then stays within ±π/4 of an axis
+    radius = np.where(sideways, a, b)  # signed: the angle is then within ±π/4 of an axis
     ratio = np.divide(np.where(sideways, b, a), radius, out=np.zeros(radius.shape), where=radius != 0)
     near, far = np.cos(math.pi / 4 * ratio), np.sin(math.pi / 4 * ratio)
     sign = np.sign(radius)
@@ -529,8 +531,9 @@ def _on_disc(xi: ArrayLike, eta: ArrayLike) -> tuple[Array, Array, Array]:
 def _on_circles(radii: Array, profile: Array, points: int) -> tuple[Array, Array]:
     """A round density that is linear between ``radii`` as points (n, 2) on circles, and their shares (n,).
 
-    Along the radius a Gauss-Legendre rule of three points on each of many pieces, exact for the integral and for
-    second moments of what is linear; around the circles even angles, every other circle turned by half a step.
+    Along the radius, a Gauss-Legendre rule of three points on each of many pieces, exact for the integral and for
+    second moments of linear functions; around the circles, equal angles, with every other circle rotated by half a
+    step.
     """
     pieces = np.maximum(1, np.ceil(np.diff(radii) / radii[-1] * points / 6)).astype(np.int64)
     edges = np.concatenate(
@@ -550,7 +553,7 @@ def _on_circles(radii: Array, profile: Array, points: int) -> tuple[Array, Array
 
 
 def _picked(shares: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
-    """The cell whose share holds a place from 0 to 1, and how far into the cell the place is, 0 to 1."""
+    """The cell that contains a place from 0 to 1 in cumulative shares, and the place within the cell, 0 to 1."""
     running = np.cumsum(shares)
     lit = np.flatnonzero(shares)
     place = place * running[-1]

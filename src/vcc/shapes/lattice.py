@@ -1,4 +1,4 @@
-"""Lattices of equal cells that tile a plane: what arrays of lenslets and prisms are made of."""
+"""Lattices of equal cells that tile a plane, for arrays of lenslets and prisms."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 LAYOUTS = ("square", "hexagonal")
 MOST_CELLS_A_SIDE = 2**20
-"""Of a block of cells."""
+"""Limit for a block of cells."""
 ROW_HEIGHT = {"square": 1.0, "hexagonal": math.sqrt(3) / 2}
 """Distance between rows of cells, in pitches."""
 
@@ -68,7 +68,7 @@ class Lattice:
 
     @property
     def corners(self) -> Array:
-        """(x, y) of a cell's corners from its centre, metres: (4, 2) or (6, 2), in order around it."""
+        """(x, y) of a cell's corners relative to its centre, metres: (4, 2) or (6, 2), in order around it."""
         if self.layout == "square":
             around, radius = (np.arange(4) + 0.5) * math.pi / 2, self.pitch / math.sqrt(2)
         else:  # flat sides at left and right
@@ -77,7 +77,7 @@ class Lattice:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """How far a cell, rotation included, extends from its centre along (x, y), metres."""
+        """Largest extent of a cell from its centre along (x, y), rotation included, metres."""
         x, y = np.abs(self.corners).max(axis=0)
         return float(x), float(y)
 
@@ -85,19 +85,19 @@ class Lattice:
     def place_from_steps(self) -> Affine:
         """From steps (a, b) to the place (x, y) of a centre, metres.
 
-        a counts along the rows, b along the next direction of the lattice, 90° or 60° on: cell (row, column) is at
-        (column, row) on the square layout, and at (column − row // 2, row) on the hexagonal one.
+        a counts along the rows, b along the next direction of the lattice, 90° or 60° further: cell (row,
+        column) is at (column, row) on the square layout, and at (column − row // 2, row) on the hexagonal one.
         """
         oblique = 0.5 if self.layout == "hexagonal" else 0.0
         across = self._turned(np.array([1.0, oblique]) * self.pitch, np.array([0.0, self.row_height]), 1)
         return Affine.from_parts(np.stack(across), self.offset)
 
     def described(self) -> str:
-        """The cells in words, such as ``"hexagonal cells (pitch 0.125 mm)"``."""
+        """The cells as text, such as ``"hexagonal cells (pitch 0.125 mm)"``."""
         return f"{self.layout} cells ({parameters_in_words(self, leave_out=('layout',))})"
 
     def cell_of(self, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of the cells that hold places x, y in metres (arrays that broadcast)."""
+        """(row, column) of the cells at places x, y in metres (arrays that broadcast)."""
         across, down = self._turned(
             np.asarray(x, float) - self.offset[0], np.asarray(y, float) - self.offset[1], -1
         )
@@ -105,7 +105,7 @@ class Lattice:
         if self.layout == "square":
             row, column = np.floor(down + 0.5), np.floor(across + 0.5)
             return row.astype(np.int64), column.astype(np.int64)
-        # The nearest centre in even rows, the nearest in odd rows, and of these the nearer.
+        # The nearest centre in even rows, the nearest in odd rows, and the nearer of the two.
         even_row = 2 * np.floor(down / 2 + 0.5)
         even_column = np.floor(across + 0.5)
         odd_row = 2 * np.floor(down / 2) + 1
@@ -127,7 +127,7 @@ class Lattice:
         return x + self.offset[0], y + self.offset[1]
 
     def local(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Places x, y counted from the centres of their cells, along the cells' own axes, metres."""
+        """Places x, y relative to the centres of their cells, along the cells' own axes, metres."""
         centre_x, centre_y = self.centre_of(*self.cell_of(x, y))
         return self._turned(np.asarray(x, float) - centre_x, np.asarray(y, float) - centre_y, -1)
 
@@ -139,18 +139,18 @@ class Lattice:
 
 
 def interleaved(layout: str, kinds: int) -> NDArray[np.int64]:
-    """Which of several kinds each cell is, so that cells of one kind lie far apart.
+    """Assign one of several kinds to each cell, so that cells of one kind are far apart.
 
-    Kinds follow a rule that is linear in the cells' places: column + k·row, modulo the number of kinds, where
-    k makes the shortest distance between two cells of one kind longest, and is the smallest that does
-    (hexagonal: columns are counted along a row of cells that runs at 60° to the rows). Direct neighbours are
+    The kind is linear in the cell's place: column + k·row, modulo the number of kinds. k is the smallest number
+    that maximises the shortest distance between two cells of one kind
+    (hexagonal: columns are counted along a row of cells at 60° to the rows). Direct neighbours are
     then of different kinds, except for two kinds in the hexagonal layout, where any three cells that touch one
     another include two of a kind: there, two of six neighbours are alike. Two kinds on the square layout are a
     checkerboard; three in the hexagonal one are the multi-focus array of Perwaß and Wietzke 2012.
 
     Args:
         layout: ``"square"`` or ``"hexagonal"``.
-        kinds: how many, 1 or more.
+        kinds: number of kinds, 1 or more.
 
     Returns:
         The kind, 0 to kinds − 1, of cell (row mod rows, column mod columns): (rows, columns).
@@ -163,7 +163,7 @@ def interleaved(layout: str, kinds: int) -> NDArray[np.int64]:
         for step in range(kinds)
     ]
     step = int(np.argmax(closest))
-    # After how many rows the rule repeats; hexagonal ones come in pairs, each one oblique column further on.
+    # Number of rows after which the rule repeats; hexagonal rows come in pairs, each one oblique column further.
     rows = 2 * kinds // math.gcd(kinds, 2 * step - 1) if hexagonal else kinds // math.gcd(kinds, step)
     row, column = np.mgrid[:rows, :kinds]
     oblique = column - row // 2 if hexagonal else column
@@ -172,7 +172,7 @@ def interleaved(layout: str, kinds: int) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class CellApertures(Pattern):
-    """Opaque gaps between the cells of a lattice: light passes near each cell's centre only.
+    """Opaque gaps between the cells of a lattice: light passes only near each cell's centre.
 
     Args:
         lattice: the cells.
@@ -203,10 +203,10 @@ class CellApertures(Pattern):
         return np.asarray(inside, dtype=np.float64)
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
-        """The open share of rectangles centred at x, y: in closed form where the lattice is not rotated.
+        """The open share of rectangles centred at x, y: in closed form if the lattice is not rotated.
 
-        A rotated lattice is sampled at 16 points across an opening or a rectangle, whichever is smaller, as long
-        as that takes 4096 points a side at most; beyond that as any pattern is.
+        A rotated lattice is sampled at 16 points across an opening or a rectangle, whichever is smaller, if this
+        takes at most 4096 points a side; otherwise like any pattern.
         """
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if self.lattice.rotation:
@@ -219,7 +219,7 @@ class CellApertures(Pattern):
         else:  # even rows, and odd rows
             content = self._content(left, top, width, height, 2 * row_height)
             content = content + self._content(left - pitch / 2, top - row_height, width, height, 2 * row_height)
-        # A share: rounding of differences of areas must not leave its range.
+        # A share: differences of areas must not leave its range by rounding.
         return np.clip(content / (width * height), 0.0, 1.0)
 
     @property
@@ -229,7 +229,7 @@ class CellApertures(Pattern):
     def _content(self, left: Array, top: Array, width: float, height: float, period: float) -> Array:
         """The open area in rectangles, of openings centred at multiples of the pitch across, ``period`` down."""
         pitch = self.lattice.pitch
-        # Counted from the cell that holds the rectangle's corner, so that areas far off do not cancel.
+        # Relative to the cell of the rectangle's corner, so that no large areas are subtracted.
         left, top = left - pitch * np.floor(left / pitch + 0.5), top - period * np.floor(top / period + 0.5)
         right, bottom = left + width, top + height
 
@@ -246,7 +246,7 @@ class CellApertures(Pattern):
     def _area_of_one(self, x: Array, y: Array) -> Array:
         """The area of one opening, centred at 0, that lies left of x and above y.
 
-        The opening reaches from −Y to Y at each place a, so that its part above y is ∫ Y(a) ± min(|y|, Y(a)) da.
+        The opening extends from −Y to Y at each place a, so that its part above y is ∫ Y(a) ± min(|y|, Y(a)) da.
         """
         half = self._half_width
         x = np.clip(x, -half, half)
@@ -258,7 +258,7 @@ class CellApertures(Pattern):
         return np.asarray(whole + np.sign(y) * cut)
 
     def _area_under(self, x: Array) -> Array:
-        """∫₀ˣ Y(a) da, where an opening reaches from −Y(a) to Y(a), |x| at most half its width."""
+        """∫₀ˣ Y(a) da for an opening that extends from −Y(a) to Y(a), |x| at most half its width."""
         half = self._half_width
         if self.circular:
             root = np.sqrt(np.maximum(half * half - x * x, 0.0))
@@ -268,7 +268,7 @@ class CellApertures(Pattern):
         return np.asarray(x * (2 * half - np.abs(x) / 2) / math.sqrt(3))
 
     def _reach_at(self, level: Array) -> Array:
-        """How far from its middle an opening extends at a height |y|."""
+        """Half the width of an opening at a height |y|."""
         half = self._half_width
         if self.circular:
             return np.asarray(np.sqrt(np.maximum(half * half - level * level, 0.0)))
@@ -283,7 +283,7 @@ class CellApertures(Pattern):
         return mean_over(across, down, lambda a, b, _: self(a, b), x, y, width, height)
 
     def _raster(self, centre: Array, length: float) -> Raster | None:
-        """16 points across an opening or a rectangle, whichever is smaller; None where those are too many."""
+        """16 points across an opening or a rectangle, whichever is smaller; None if these are too many."""
         low = float(centre.min()) - length / 2
         extent, finest = float(centre.max()) + length / 2 - low, min(length, 2 * self._half_width)
         if finest <= 0 or extent / finest * RASTER_PER_CELL > RASTER_LIMIT:
@@ -295,7 +295,7 @@ class CellApertures(Pattern):
 
 @dataclass(frozen=True)
 class CellBlock(Pattern):
-    """A block of cells of a lattice, opaque outside it: the clear part of an array of so many cells.
+    """A block of cells of a lattice, opaque outside: the clear part of an array with a limited number of cells.
 
     Args:
         lattice: the cells; cell (0, 0) is the block's upper left one.
@@ -317,7 +317,7 @@ class CellBlock(Pattern):
     @property
     def size(self) -> tuple[float, float]:
         """(width, height) around the middle outside which nothing passes, metres."""
-        # The outermost lie in the corners, or a row from there where every other row is shifted.
+        # The outermost cells are in the corners, or one row from there if every other row is shifted.
         row, column = np.meshgrid(
             [0, min(1, self.rows - 1), max(self.rows - 2, 0), self.rows - 1], [0, self.columns - 1]
         )

@@ -1,8 +1,8 @@
-"""What each cell of a mask adds to weighted means of a pattern that it is a part of.
+"""Gradients of weighted means of a pattern with respect to the cells of a mask in it.
 
-A pattern's mean over a rectangle is linear in the values of each array of cells in it, whatever it is multiplied
-with on its sheet. Here is the transpose of that linear map, rectangle by rectangle: from weights of the means to
-weights of the cells. It is what a mask's cells are learned by (`vcc.plan.footprints.means`).
+A pattern's mean over a rectangle is linear in the values of each array of cells in it, for any other factors
+on its sheet. This module is the transpose of that linear map, rectangle by rectangle: from weights of the means to
+weights of the cells. It is used for learning a mask's cells (`vcc.plan.footprints.means`).
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ Array = NDArray[np.float64]
 
 
 def is_values(thing: Any, field: str) -> bool:
-    """Whether a field of a thing holds the values of an array of cells."""
+    """Whether a field of an object holds the values of an array of cells."""
     return isinstance(thing, Cells) and field == "values"
 
 
 def holds(pattern: Pattern | None, cells: Cells) -> bool:
-    """Whether an array of cells, this very object, is a part of a pattern."""
+    """Whether an array of cells (the same object) is a part of a pattern."""
     if isinstance(pattern, Product):
         return any(holds(part, cells) for part in pattern.patterns)
     return holds(pattern.pattern, cells) if isinstance(pattern, Bounded | Shifted) else pattern is cells
 
 
 def cells_back(cells: Cells, places: tuple[Array, Array], size: Sequence[float], weights: Array) -> Array:
-    """What each value of an array of cells adds to Σ weights · cells.mean(x, y, width, height).
+    """The gradient of Σ weights · cells.mean(x, y, width, height) with respect to the values of the cells.
 
     Args:
         cells: the array.
@@ -50,13 +50,13 @@ def cells_back(cells: Cells, places: tuple[Array, Array], size: Sequence[float],
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OnSheet(Brief):
-    """A product of patterns, with an array of cells told apart from what else there is.
+    """A product of patterns, with an array of cells separated from the other factors.
 
     Args:
-        tiles: what the cells and all other rectangles multiply to.
-        own: the cells where they stand.
+        tiles: product of the cells and all other rectangles.
+        own: the cells at their place.
         sheet: the other rectangles, or None.
-        others: all that is not made of rectangles.
+        others: all factors that are not made of rectangles.
     """
 
     tiles: Tiles
@@ -66,7 +66,7 @@ class OnSheet(Brief):
 
     @classmethod
     def of(cls, product: Product, cells: Cells) -> OnSheet:
-        """A product of which an array of cells, this very object, is a part, once."""
+        """From a product that contains an array of cells (the same object) exactly once."""
         own = Tiles.of(cells).moved(*_middle(product, cells))
         rest = Product((_without(product, cells),)).factors
         sheet = next((factor for factor in rest if isinstance(factor, Tiles)), None)
@@ -74,7 +74,7 @@ class OnSheet(Brief):
         return cls(own if sheet is None else own.times(sheet), own, sheet, others)
 
     def back(self, weights: Array) -> Array:
-        """Weights of the rectangles as weights of the cells."""
+        """Convert weights of the rectangles to weights of the cells."""
         if self.sheet is None:
             return weights
         x, y = ((borders[1:] + borders[:-1]) / 2 for borders in (self.tiles.columns, self.tiles.rows))
@@ -90,7 +90,7 @@ class OnSheet(Brief):
 
 
 def _middle(pattern: Pattern, cells: Cells) -> tuple[float, float]:
-    """Where the origin of an array of cells stands on the sheet of a pattern that it is a part of, metres."""
+    """Place of the origin of an array of cells on the sheet of a pattern that contains it, metres."""
     if isinstance(pattern, Product):
         return _middle(next(part for part in pattern.patterns if holds(part, cells)), cells)
     if isinstance(pattern, Bounded):
@@ -102,7 +102,7 @@ def _middle(pattern: Pattern, cells: Cells) -> tuple[float, float]:
 
 
 def _without(pattern: Pattern, cells: Cells) -> Pattern:
-    """The pattern with an open sheet in the place of an array of cells."""
+    """The pattern with an open sheet in place of an array of cells."""
     if isinstance(pattern, Product):
         return Product(tuple(_without(part, cells) for part in pattern.patterns))
     if isinstance(pattern, Bounded | Shifted):
@@ -111,7 +111,7 @@ def _without(pattern: Pattern, cells: Cells) -> Pattern:
 
 
 def tiles_back(tiles: Tiles, places: tuple[Array, Array], size: Sequence[float], weights: Array) -> Array:
-    """What each of some rectangles side by side adds to weighted means: (rows, columns) of them."""
+    """The gradient of weighted means with respect to rectangles side by side: (rows, columns) of them."""
     x, y = places
     width = max(size[0], float(np.ptp(tiles.columns)) * 1e-5)
     height = max(size[1], float(np.ptp(tiles.rows)) * 1e-5)
@@ -124,7 +124,7 @@ def tiles_back(tiles: Tiles, places: tuple[Array, Array], size: Sequence[float],
 
 
 def _overlaps(borders: Array, centres: Array, length: float) -> Any:
-    """Share of each interval around a centre that each piece between borders fills: sparse (intervals, pieces)."""
+    """Share of each interval around a centre covered by each piece between borders: sparse (intervals, pieces)."""
     from scipy.sparse import csr_array
 
     low, high, pieces = centres - length / 2, centres + length / 2, len(borders) - 1

@@ -1,9 +1,9 @@
-"""Transmission patterns: what a mask lets through, as a function of position.
+"""Transmission patterns: the transmission of a mask as a function of position.
 
-A pattern is called with positions (x, y) in metres from its own middle (x right, y down) and returns the
-transmitted share, 0 to 1. Light fields are sampled in cells, so what a camera needs is a pattern's *mean*
-over a rectangle, never its value at a point: patterns with a closed form give it exactly, the others
-through a fine raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
+A pattern is called with positions (x, y) in metres relative to its own middle (x right, y down) and returns the
+transmitted share, 0 to 1. Light fields are sampled in cells, so a camera needs a pattern's *mean*
+over a rectangle, never its value at a point: patterns with a closed form compute it exactly, the others
+with a fine raster. `as_pattern` converts any function of (x, y) to a pattern.
 """
 
 from __future__ import annotations
@@ -32,29 +32,29 @@ from vcc.base.values import Value
 Array = NDArray[np.float64]
 
 RASTER_PER_CELL = 16
-"""Raster points across a rectangle for patterns without a closed form: edges are right to 1/16² of it."""
+"""Raster points across a rectangle for patterns without a closed form: edges are accurate to 1/16² of it."""
 FEWEST_PER_CELL = 4
-"""Raster points across a rectangle with which to make do where there are many rectangles side by side."""
+"""Smallest number of raster points across a rectangle, for many rectangles side by side."""
 RASTER_LIMIT = 4096
 """Largest square raster, points a side: 128 MiB of float64 while a plan is being made."""
 LONGEST_RASTER = 4 * RASTER_LIMIT
-"""Points along the longer side of a raster that is no square."""
+"""Points along the longer side of a raster that is not square."""
 
 
 class Pattern(Shown, abc.ABC):
-    """What a flat element transmits, by position. Final classes are frozen dataclasses of SI numbers."""
+    """Transmission of a flat element, by position. Final classes are frozen dataclasses of SI numbers."""
 
     @abc.abstractmethod
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Transmission, 0 to 1, at positions x, y in metres (arrays that broadcast against each other)."""
 
     def described(self) -> str:
-        """The pattern in words, such as ``"circle (diameter 3 mm)"``."""
+        """The pattern as text, such as ``"circle (diameter 3 mm)"``."""
         return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
 
     @property
     def size(self) -> tuple[float, float]:
-        """(width, height) in metres outside which nothing passes; infinite where there is no such bound."""
+        """(width, height) in metres outside which nothing passes; infinite if there is no such bound."""
         return math.inf, math.inf
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
@@ -88,19 +88,19 @@ def mean_by_raster(
     height: float,
     fewest: int,
 ) -> Array | None:
-    """Means over rectangles by way of a raster, whose points lie the same whichever rectangles are asked for.
+    """Means over rectangles by a raster whose points do not depend on the rectangles.
 
     Args:
-        values: of raster points at (x, y), whose own size (x, y) is the third argument, metres.
+        values: function of raster points (x, y) and, as third argument, their size (x, y), metres.
         size: (width, height) around the origin outside which nothing passes, metres.
         x: centres of the rectangles, metres.
         y: likewise.
         width: of every rectangle, metres.
         height: of every rectangle, metres.
-        fewest: points across a rectangle with which to make do where `RASTER_PER_CELL` would be too many.
+        fewest: smallest number of points across a rectangle, if `RASTER_PER_CELL` would be too many.
 
     Returns:
-        The means; None where even the fewest points across each rectangle are too many.
+        The means; None if even the fewest points across each rectangle are too many.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     across, down = (
@@ -131,11 +131,11 @@ class Raster(NamedTuple):
 
 
 def raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | None:
-    """The points of `mean_by_raster` along an axis; None where even the fewest are too many."""
+    """The points of `mean_by_raster` along an axis; None if even the fewest are too many."""
     low = max(float(centre.min()) - length / 2, -bound / 2)
     high = max(min(float(centre.max()) + length / 2, bound / 2), low)
     across = RASTER_PER_CELL
-    # By the pattern's own size where it has one, so that pieces of a light field see the same raster.
+    # By the pattern's own size if it has one, so that pieces of a light field use the same raster.
     extent = bound if math.isfinite(bound) else high - low
     while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
         across //= 2
@@ -155,7 +155,7 @@ def mean_over(
     width: float,
     height: float,
 ) -> Array:
-    """Means over rectangles of what the points of a raster show; the rest as for `mean_by_raster`."""
+    """Means over rectangles of values at the points of a raster; arguments as for `mean_by_raster`."""
     found = np.asarray(values(across.places[None, :], down.places[:, None], (across.step, down.step)), float)
     cells = np.broadcast_to(found, (down.places.size, across.places.size))
     middle = (across.low + across.high) / 2, (down.low + down.high) / 2
@@ -167,10 +167,10 @@ def _share_by_integral(
 ) -> Array:
     """The share of rectangles that lies inside a hole around the origin.
 
-    Its rim cuts few of many rectangles: the area is that of these alone.
+    The rim cuts few of many rectangles: areas are computed only for these.
 
     Args:
-        hole: whose area is known.
+        hole: with a known area.
         x: centres, metres.
         y: centres, metres, of the same shape.
         width: of every rectangle, metres.
@@ -192,13 +192,13 @@ def _mean_from_integral(
     """The mean over rectangles of a function whose integral over (−∞, x] × (−∞, y] is known."""
     right, left, bottom, top = x + width / 2, x - width / 2, y + height / 2, y - height / 2
     content = integral(right, bottom) - integral(left, bottom) - integral(right, top) + integral(left, top)
-    # What passes is a share: rounding of differences of integrals must not leave it.
+    # Transmission is a share: differences of integrals must not leave its range by rounding.
     return np.clip(content / (width * height), 0.0, None)
 
 
 @dataclass(frozen=True)
 class Open(Pattern):
-    """Lets everything through."""
+    """Transmits all light."""
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """One everywhere."""
@@ -252,7 +252,7 @@ class Circle(Pattern):
         return cut + np.where(y >= 0, 2 * full, 0.0)
 
     def _below_arc(self, a: Array) -> Array:
-        """∫₀ᵃ √(R² − x²) dx; what rounding leaves of the root counts in both terms, and cancels."""
+        """∫₀ᵃ √(R² − x²) dx; rounding errors of the root appear in both terms, and cancel."""
         radius = self.diameter / 2
         root = np.sqrt(np.maximum(radius**2 - a * a, 0))
         return np.asarray((a * root + radius**2 * np.arctan2(a, root)) / 2)
@@ -260,10 +260,10 @@ class Circle(Pattern):
 
 @dataclass(frozen=True)
 class Polygon(Pattern):
-    """A regular polygon, as the blades of an iris form it.
+    """A regular polygon, as formed by the blades of an iris.
 
     Args:
-        sides: how many, 3 to 1000.
+        sides: number of sides, 3 to 1000.
         diameter: of the circle through the corners, metres.
         rotation: radians, clockwise as seen looking at the scene; at 0 a corner points right.
     """
@@ -301,14 +301,15 @@ class Polygon(Pattern):
 
     @property
     def _apothem(self) -> float:
-        """From the middle to a side, metres."""
+        """Distance from the middle to a side, metres."""
         return self.diameter / 2 * math.cos(math.pi / self.sides)
 
     def _integral(self, x: Array, y: Array) -> Array:
         """Area of the polygon left of x and above y.
 
-        By Green's theorem it is ∮ min(x(b), x) db around what lies above y: less x·∮ db = 0,
-        −∮ max(x − x(b), 0) db, side by side a mean of what is linear where it is above 0, times the side's height.
+        By Green's theorem it is ∮ min(x(b), x) db around the part above y. Since x·∮ db = 0, this equals
+        −∮ max(x − x(b), 0) db: for each side, the mean of the positive part of a linear function, times the side's
+        height.
         """
         angle = self.rotation + 2 * math.pi * np.arange(self.sides + 1) / self.sides
         a, b = self.diameter / 2 * np.cos(angle), self.diameter / 2 * np.sin(angle)
@@ -326,7 +327,7 @@ class Polygon(Pattern):
 
 
 def _mean_above_zero(one: Array, other: Array) -> Array:
-    """The mean of max(f, 0) where f goes linearly from one number to another."""
+    """The mean of max(f, 0) for a function f that is linear from one number to another."""
     low, high = np.minimum(one, other), np.maximum(one, other)
     crossing = (low < 0) & (high > 0)
     crossed = np.divide(high * high, 2 * (high - low), out=np.zeros(low.shape), where=crossing)
@@ -335,7 +336,7 @@ def _mean_above_zero(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Cells(Value, Pattern):
-    """A transmission array, values and a frame: uniform rectangular cells side by side, opaque outside.
+    """A transmission array: values and a frame; uniform rectangular cells side by side, opaque outside.
 
     Args:
         values: transmission of each cell, 0 to 1, shape (rows, columns), row 0 at the top.
@@ -398,12 +399,12 @@ class Cells(Value, Pattern):
         )
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The value of the cell that holds each position; zero outside the array."""
+        """The value of the cell at each position; zero outside the array."""
         r, c = self.cells_at(np.asarray(x, float), np.asarray(y, float))
         return np.where((r >= 0) & (c >= 0), self.values[r, c], 0.0)
 
     def cells_at(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows of the cells that hold places y, and columns of those that hold x; −1 outside the array."""
+        """Rows of the cells at places y, and columns of the cells at places x; −1 outside the array."""
         places = zip(self._index(x, y), self.values.shape, strict=True)
         row, column = (
             np.where((place >= 0) & (place < count), np.floor(place), -1).astype(np.int64)
@@ -415,13 +416,13 @@ class Cells(Value, Pattern):
         """Mean transmission over rectangles, exact (differences of the array's integral)."""
         width, height = max(width, self.width * 1e-5), max(height, self.size[1] * 1e-5)
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        if is_grid(x, y):  # then two small products do it
+        if is_grid(x, y):  # then two small products are enough
             content = self.means(self.values[None], x.reshape(-1), y.reshape(-1), width, height)
             return content.reshape(np.broadcast_shapes(x.shape, y.shape))
         return _mean_from_integral(self._integral, x, y, width, height)
 
     def means(self, values: Array, x: Array, y: Array, width: float, height: float) -> Array:
-        """`mean` of several arrays in this one's place, over rectangles in rows and columns.
+        """`mean` for several arrays in place of this one, over rectangles in rows and columns.
 
         Args:
             values: (arrays, rows, columns).
@@ -438,7 +439,7 @@ class Cells(Value, Pattern):
         return np.stack([down @ each @ across.T for each in values])
 
     def _index(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """(row, column) counted from the array's top left corner, cells as units."""
+        """(row, column) relative to the array's top left corner, in cells."""
         place = self._place
         return y * place.matrix[1, 1] + place.offset[1] + 0.5, x * place.matrix[0, 0] + place.offset[0] + 0.5
 
@@ -465,7 +466,7 @@ class Cells(Value, Pattern):
         return np.asarray(bilinear(total, *self._index(x, y)) * (self.width / columns) * (self.height / rows))
 
     def described(self) -> str:
-        """The number of cells and the size of the array in words."""
+        """The number of cells and the size of the array as text."""
         rows, columns = self.values.shape
         return f"{rows}×{columns} cells ({text(self.width)} wide)"
 
@@ -475,7 +476,7 @@ class Cells(Value, Pattern):
 
 
 def _densely(overlaps: Any) -> Any:
-    """A sparse matrix as a full one, if it is so full that products of it then take less time."""
+    """A sparse matrix, converted to a full one if products of that are faster."""
     return overlaps.toarray() if 8 * overlaps.nnz > math.prod(overlaps.shape) else overlaps
 
 
@@ -486,8 +487,8 @@ class CosineSum(Pattern):
     T(x, y) = ∏ over the axes of ½ + (1/2h)·Σₙ cos(2πn·x/period), n = 1 … h (Veeraraghavan et al. 2007,
     section 3, in the separable form that a printed transparency can have).
 
-    Args:
-        period: of the first harmonic, metres: one number, or (x, y), where infinity leaves an axis flat.
+    period: of the first harmonic, metres: one number, or (x, y), where infinity makes an axis constant.
+        harmonics: h, number of equal cosines along each axis, 1 to 1000.
         harmonics: h, how many equal cosines along each axis, 1 to 1000.
         phase: radians, added to every first harmonic (n times to the n-th).
     """
@@ -534,16 +535,16 @@ class FunctionPattern(Pattern):
 
     Args:
         function: called with x and y in metres (arrays that broadcast); returns transmission, 0 to 1.
-        owner: the element whose pattern it is, named when the function returns something else.
+        owner: the element of the pattern, named in errors if the function returns invalid values.
     """
 
     function: Callable[[Array, Array], ArrayLike]
     owner: str = ""
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """What the function returns, checked."""
+        """The function's values, validated."""
         x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-        # As whole arrays: a function of x alone then returns one number for each place, too.
+        # Full arrays: a function of x alone then returns one number for each place, too.
         x, y = np.broadcast_arrays(x, y)
         shape = x.shape
         name = f"pattern {getattr(self.function, '__name__', repr(self.function))}"
@@ -563,7 +564,7 @@ class FunctionPattern(Pattern):
 
 
 def owned(pattern: Pattern, owner: str) -> Pattern:
-    """The pattern, whose functions name their owner when they return something else than transmissions."""
+    """The pattern with the name of its owner, for errors of functions that return invalid values."""
     if isinstance(pattern, FunctionPattern):
         return replace(pattern, owner=owner)
     if isinstance(pattern, Bounded):
@@ -575,7 +576,7 @@ def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Patter
     """A pattern from a pattern or from any function of (x, y) in metres.
 
     Raises:
-        InputError: neither: a class or a name, for instance.
+        InputError: an object of another type: a class or a name, for instance.
     """
     if isinstance(pattern, Pattern):
         return pattern
@@ -618,12 +619,12 @@ class Bounded(Pattern):
     """Another pattern on a sheet of limited size, opaque outside it.
 
     Args:
-        pattern: what the sheet carries.
+        pattern: on the sheet.
         width: of the sheet, metres.
         height: of the sheet, metres.
 
     Raises:
-        InputError: what is no pattern, or a size of 0 or less.
+        InputError: an object that is not a pattern, or a size of 0 or less.
     """
 
     pattern: Pattern
@@ -636,7 +637,7 @@ class Bounded(Pattern):
 
     @property
     def size(self) -> tuple[float, float]:
-        """(width, height) of what passes, metres."""
+        """(width, height) of the clear area, metres."""
         return min(self.width, self.pattern.size[0]), min(self.height, self.pattern.size[1])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
@@ -648,7 +649,7 @@ class Bounded(Pattern):
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """The pattern's mean times the share of each rectangle that lies on the sheet.
 
-        Exact where no rectangle crosses the border of the sheet, or the pattern is even across it.
+        Exact if no rectangle crosses the border of the sheet, or if the pattern is constant across it.
         """
         x, y = np.asarray(x, float), np.asarray(y, float)
         share_x = overlap_share(x, max(width, self.width * 1e-5), self.width)
@@ -663,7 +664,7 @@ def overlap_share(centre: Array, length: Array | float, sheet: float) -> Array:
 
 
 LARGEST_MURA = 4093
-"""Cells a side of the largest MURA that is made, 134 MB of them."""
+"""Cells a side of the largest MURA, which takes 134 MB."""
 
 
 def mura(prime: int) -> NDArray[np.float64]:
@@ -694,12 +695,12 @@ def mura(prime: int) -> NDArray[np.float64]:
 
 
 def overlaps(first: Array, last: Array, count: int) -> Any:
-    """How much of each of so many cells each interval covers, a sparse matrix (intervals, cells).
+    """Lengths of each cell that each interval covers, a sparse matrix (intervals, cells).
 
     Args:
-        first: where intervals begin, in cells from the border of the first, (intervals,).
-        last: where they end.
-        count: of the cells.
+        first: starts of the intervals, in cells from the border of the first cell, (intervals,).
+        last: their ends.
+        count: number of cells.
     """
     from scipy.sparse import csr_array
 

@@ -1,8 +1,8 @@
-"""Several patterns in one plane: light passes what all of them let pass, place by place.
+"""Several patterns in one plane: light passes the product of their transmissions, place by place.
 
-The mean of a product is not the product of the means: a checkerboard and its negative pass nothing together, and
-half of the light each. So patterns of one plane are multiplied first and averaged then. Those made of rectangles
-are multiplied exactly, rectangle by rectangle; what is left is multiplied on a fine raster.
+The mean of a product is not the product of the means: a checkerboard and its negative together transmit nothing,
+but each of them transmits half of the light. So patterns in one plane are multiplied before they are averaged.
+Patterns made of rectangles are multiplied exactly, rectangle by rectangle; the others on a fine raster.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from vcc.shapes.patterns import (
 Array = NDArray[np.float64]
 
 OVERLAPPING = 8
-"""Times that rectangles cover rows of tiles from which on an integral of all tiles pays."""
+"""How often rectangles must cover the rows of tiles, on average, for an integral of all tiles to be faster."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shifted(Pattern):
-    """A pattern whose middle stands elsewhere.
+    """A pattern with its middle at another place.
 
     Args:
-        pattern: what is shifted.
+        pattern: to shift.
         middle: place (x, y) of its middle, metres.
     """
 
@@ -59,18 +59,18 @@ class Shifted(Pattern):
         return width + 2 * abs(self.middle[0]), height + 2 * abs(self.middle[1])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The pattern's transmission at places counted from its middle."""
+        """The pattern's transmission at places relative to its middle."""
         return self.pattern(np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1])
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
-        """The pattern's mean over rectangles counted from its middle."""
+        """The pattern's mean over rectangles relative to its middle."""
         x, y = np.asarray(x, float) - self.middle[0], np.asarray(y, float) - self.middle[1]
         return self.pattern.mean(x, y, width, height)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Tiles(Brief, Pattern):
-    """Uniform rectangles of any sizes side by side, opaque outside them: what `Cells` multiply to.
+    """Uniform rectangles of any sizes side by side, opaque outside: a product of `Cells`.
 
     Args:
         columns: x of the rectangles' borders, rising, metres, (n + 1,).
@@ -84,7 +84,7 @@ class Tiles(Brief, Pattern):
 
     @classmethod
     def of(cls, cells: Cells) -> Tiles:
-        """The same pattern as an array of cells."""
+        """An array of cells, converted."""
         rows, columns = cells.values.shape
         width, height = cells.width, float(cells.height or 0.0)
         x, y = cells.middle
@@ -100,11 +100,11 @@ class Tiles(Brief, Pattern):
         return cls(np.array([-width, width]) / 2, np.array([-height, height]) / 2, np.ones((1, 1)))
 
     def moved(self, x: float, y: float) -> Tiles:
-        """The same rectangles elsewhere."""
+        """The same rectangles, moved by (x, y)."""
         return Tiles(self.columns + x, self.rows + y, self.values)
 
     def times(self, other: Tiles) -> Tiles:
-        """What both together let pass, exactly."""
+        """The product of both, exactly."""
         columns, rows = _common(self.columns, other.columns), _common(self.rows, other.rows)
         if columns.size < 2 or rows.size < 2:  # they do not overlap: nothing passes
             return Tiles(self.columns[[0, -1]], self.rows[[0, -1]], np.zeros((1, 1)))
@@ -117,7 +117,7 @@ class Tiles(Brief, Pattern):
         return 2 * float(np.abs(self.columns).max()), 2 * float(np.abs(self.rows).max())
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """The value of the rectangle that holds each place, zero outside."""
+        """The value of the rectangle at each place, zero outside."""
         x, y = np.asarray(x, float), np.asarray(y, float)
         column = np.searchsorted(self.columns, x, side="right") - 1
         row = np.searchsorted(self.rows, y, side="right") - 1
@@ -155,12 +155,12 @@ class Tiles(Brief, Pattern):
         return total.cumsum(1, out=total)
 
     def _worth_an_integral(self, first: Array, last: Array) -> bool:
-        """Whether rectangles, from and to places in numbers of rows, overlap so that sums are taken many times."""
+        """Whether rectangles, given by first and last row, overlap so much that an integral is faster."""
         return float(np.sum(last - first + 1)) > OVERLAPPING * len(self.rows)
 
     @staticmethod
     def _place(borders: Array, at: Array) -> Array:
-        """Places as numbers of borders, fractions between them."""
+        """Places as fractional numbers of borders."""
         return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
 
 
@@ -175,7 +175,7 @@ def _between(table: Array, place: Array, axis: int) -> Array:
 
 
 def _common(one: Array, other: Array) -> Array:
-    """The borders of both within what both cover; borders that rounding keeps apart become one."""
+    """The borders of both within their common range; borders that differ only by rounding become one."""
     low, high = max(one[0], other[0]), min(one[-1], other[-1])
     borders = np.unique(np.concatenate([one, other]))
     borders = borders[(borders >= low) & (borders <= high)]
@@ -186,7 +186,7 @@ def _common(one: Array, other: Array) -> Array:
 
 @dataclass(frozen=True)
 class Product(Pattern):
-    """Several patterns on one sheet: light passes what all of them let pass.
+    """Several patterns on one sheet: light passes the product of their transmissions.
 
     Args:
         patterns: one or more.
@@ -214,7 +214,7 @@ class Product(Pattern):
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """Mean of the product over rectangles.
 
-        Exact where all patterns are cells or clear sheets, or but one are clear. Else on a raster of 16 points
+        Exact if all patterns are cells or clear sheets, or if all but one are clear. Else on a raster of 16 points
         across a rectangle (4 at least): each point holds the product of the patterns' means around it.
         """
         factors = self.factors
@@ -230,7 +230,7 @@ class Product(Pattern):
             return np.clip(product_of_means(factors, px, py, *point), 0.0, 1.0)
 
         found = mean_by_raster(values, self.size, x, y, width, height, FEWEST_PER_CELL)
-        if found is None:  # few small rectangles far apart: look inside each
+        if found is None:  # few small rectangles far apart: sample inside each
             steps = (np.arange(FEWEST_PER_CELL) + 0.5) / FEWEST_PER_CELL - 0.5
             part = width / FEWEST_PER_CELL, height / FEWEST_PER_CELL
             inside = [
@@ -242,8 +242,8 @@ class Product(Pattern):
     @property
     @cached
     def factors(self) -> tuple[Pattern, ...]:
-        """The patterns, all that are made of rectangles multiplied to one, and what is clear left out."""
-        # What is open or opaque is the same twice: two equal rims in one plane are one.
+        """The patterns, with those made of rectangles multiplied into one, and without clear ones."""
+        # Holes are open or opaque, so that equal ones can be merged: two equal rims in one plane are one.
         simple: list[Pattern] = []
         holes: list[tuple[Pattern, tuple[float, float]]] = []
         for part in _parts(self.patterns, (0.0, 0.0)):
@@ -259,7 +259,7 @@ class Product(Pattern):
 
 
 def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable[Pattern]:
-    """The simple patterns that these are products of, around places on one sheet."""
+    """The simple patterns whose product these are, at their places on one sheet."""
     x, y = middle
     for pattern in patterns:
         if isinstance(pattern, Open):
@@ -280,7 +280,7 @@ def _parts(patterns: Iterable[Pattern], middle: tuple[float, float]) -> Iterable
 
 
 def product_of_means(factors: tuple[Pattern, ...], x: Array, y: Array, width: float, height: float) -> Array:
-    """The product of means over small rectangles; functions, whose means are rasters again, at a point."""
+    """The product of means over small rectangles; functions, whose means need a raster, are taken at a point."""
     total: Array = np.ones(1)
     for factor in factors:
         plain = factor.pattern if isinstance(factor, Shifted) else factor
@@ -290,11 +290,11 @@ def product_of_means(factors: tuple[Pattern, ...], x: Array, y: Array, width: fl
 
 
 def clear_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Whether a pattern lets all light pass in rectangles, as far as that can be told from what it is.
+    """Whether a pattern is known to transmit all light in rectangles.
 
     Args:
         pattern: any.
-        low: (x, y) of the rectangles' corners, metres from the pattern's middle, (..., 2).
+        low: (x, y) of the rectangles' corners, metres relative to the pattern's middle, (..., 2).
         high: (x, y) of the opposite corners.
     """
     clear = np.ones(np.shape(low)[:-1], dtype=np.bool_)
@@ -321,7 +321,7 @@ def has_edges(pattern: Pattern) -> bool:
 
 
 def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
-    """Whether a pattern lets no light pass in rectangles, as far as its size tells; see `clear_over`."""
+    """Whether a pattern is known from its size to transmit no light in rectangles; see `clear_over`."""
     half = np.array(pattern.size) / 2
     return np.asarray(((low >= half) | (high <= -half)).any(axis=-1))
 
@@ -329,11 +329,11 @@ def dark_over(pattern: Pattern, low: Array, high: Array) -> NDArray[np.bool_]:
 def not_clear_next_to_others(
     patterns: list[tuple[Pattern, tuple[float, float]]], kinds: tuple[type[Pattern], ...] = (Circle,)
 ) -> tuple[int, ...]:
-    """Which patterns of one plane cut light off: what is clear all over another of them does not.
+    """The patterns in one plane that cut off light; a pattern that is clear all over another one does not.
 
     Args:
         patterns: each with the place (x, y) of its middle, metres.
-        kinds: what may be left out. Round holes by default: what cells let pass may be learned.
+        kinds: types that may be left out. Round holes by default, because values of cells may be learned.
     """
     kept = list(range(len(patterns)))
     for n, (hole, middle) in enumerate(patterns):
@@ -349,7 +349,7 @@ def not_clear_next_to_others(
 
 
 def in_one_plane(patterns: list[tuple[Pattern, tuple[float, float]]]) -> Pattern:
-    """Patterns with their middles in one plane, multiplied: a pattern about the plane's own origin.
+    """The product of patterns at their places in one plane: a pattern about the plane's own origin.
 
     Args:
         patterns: each with the place (x, y) of its middle, metres.

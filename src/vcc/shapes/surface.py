@@ -1,9 +1,9 @@
 """Surfaces of phase plates: the optical path that a thin plate adds, as a function of position.
 
 A thin plate of height h(x, y) and refractive index n in air adds the optical path OPL = (n − 1)·h. Rays are
-normal to wavefronts, so that the plate adds the path's gradient to their slopes, (Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y):
+normal to wavefronts, so the plate adds the path's gradient to their slopes, (Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y):
 light bends towards the thicker glass (Born and Wolf, Principles of Optics, section 3.1, for small slopes). Only
-differences of path matter; a constant does nothing. Positions (x, y) are in metres from the surface's own
+differences of path matter; a constant has no effect. Positions (x, y) are in metres relative to the surface's own
 middle, x right and y down, and slopes have no unit.
 """
 
@@ -23,17 +23,18 @@ from vcc.base.showing import Shown
 Array = NDArray[np.float64]
 
 RASTER = 257
-"""Points a side at which slopes are looked at for their largest, where no closed form is known."""
+"""Points a side at which slopes are sampled to estimate their maximum, if there is no closed form."""
 
 
 class Surface(Shown, abc.ABC):
     """The optical path that a thin plate adds, by position. Final classes are frozen dataclasses of SI numbers.
 
-    Yours needs `path` and `slopes`; the rest follows. Where slopes are linear in a field of many numbers, name it
-    in ``linear_in`` and write `slopes_back`: they are then learned all at once, not by two plans for each of them.
+    Subclasses define `path` and `slopes`; the rest is optional. If slopes are linear in a field of many numbers,
+    name the field in ``linear_in`` and define `slopes_back`: all of its numbers are then learned at once,
+    instead of with two plans for each.
 
     Attributes:
-        linear_in: of the class, the field that `slopes` are linear in; None where there is no `slopes_back`.
+        linear_in: of the class, the field that `slopes` are linear in; None without `slopes_back`.
     """
 
     linear_in: ClassVar[str | None] = None
@@ -44,10 +45,10 @@ class Surface(Shown, abc.ABC):
 
     @abc.abstractmethod
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """(Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y), which rays gain at positions x, y in metres (broadcast)."""
+        """(Δs, Δt) = (∂OPL/∂x, ∂OPL/∂y), added to the slopes of rays at positions x, y in metres (broadcast)."""
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
-        """The transpose of `slopes`: what each number of ``linear_in`` adds to Σ weights[0]·Δs + Σ weights[1]·Δt.
+        """The transpose of `slopes`: the gradient of Σ weights[0]·Δs + Σ weights[1]·Δt to ``linear_in``.
 
         Args:
             x: columns of a grid of places, (1, n), metres.
@@ -61,18 +62,18 @@ class Surface(Shown, abc.ABC):
 
     @property
     def affine(self) -> Affine | None:
-        """The deflection as a 5×5 map of rays where the slopes are linear in x and y, else None."""
+        """The deflection as a 5×5 map of rays if the slopes are linear in x and y, else None."""
         return None
 
     @property
     def size(self) -> tuple[float, float]:
-        """(width, height) in metres outside which the surface is not known; infinite where there is no bound."""
+        """(width, height) in metres outside which the surface is undefined; infinite if there is no bound."""
         return math.inf, math.inf
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
         """Bounds of (|Δs|, |Δt|) over the rectangle of these half sizes around the middle, metres.
 
-        Here: the largest on a raster of 257×257 points, edges included, and 5 % more.
+        Default: the largest values on a raster of 257×257 points, edges included, plus 5 %.
         """
         x = np.linspace(-half_width, half_width, RASTER)
         y = np.linspace(-half_height, half_height, RASTER)
@@ -80,7 +81,7 @@ class Surface(Shown, abc.ABC):
         return 1.05 * float(np.abs(s).max()), 1.05 * float(np.abs(t).max())
 
     def described(self) -> str:
-        """The surface in words, such as ``"quadratic (focal length 50 mm)"``."""
+        """The surface as text, such as ``"quadratic (focal length 50 mm)"``."""
         return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
 
 

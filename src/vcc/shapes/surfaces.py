@@ -1,4 +1,4 @@
-"""Surfaces in closed form, and the other surfaces by name; see `vcc.shapes.surface` for what they are."""
+"""Surfaces in closed form, and the other surfaces by name; see `vcc.shapes.surface` for definitions."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from vcc.shapes.zernike import noll as noll
 
 @dataclass(frozen=True)
 class Quadratic(Surface):
-    """A paraboloid, which is a thin lens: OPL = −r²/2f, Δs = −x/f, Δt = −y/f.
+    """A paraboloid, equivalent to a thin lens: OPL = −r²/2f, Δs = −x/f, Δt = −y/f.
 
     Args:
         focal_length: metres; negative for a diverging lens.
 
     Raises:
-        InputError: a focal length of 0 or not a number.
+        InputError: a focal length of 0 or NaN.
     """
 
     focal_length: float = field(metadata={"unit": "length"})
@@ -58,7 +58,7 @@ class Quadratic(Surface):
 
 @dataclass(frozen=True)
 class Tilt(Surface):
-    """A wedge, which is a thin prism: OPL = δs·x + δt·y.
+    """A wedge, equivalent to a thin prism: OPL = δs·x + δt·y.
 
     Args:
         deflection: (δs, δt), dimensionless slopes; positive moves light to the right and down. A wedge of
@@ -115,7 +115,7 @@ class Cubic(Surface):
 
     @classmethod
     def from_alpha(cls, alpha: float, half_width: float, wavelength: float) -> Cubic:
-        """The plate of phase α·((x/R)³ + (y/R)³), as Dowski and Cathey state it.
+        """The plate of phase α·((x/R)³ + (y/R)³), in the notation of Dowski and Cathey.
 
         Args:
             alpha: α, radians of phase at the edge of the pupil, on each axis.
@@ -141,7 +141,7 @@ class Cubic(Surface):
 
     @property
     def affine(self) -> Affine | None:
-        """Nothing where the strength is 0."""
+        """The identity if the strength is 0."""
         return Affine.identity() if self.strength == 0 else None
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
@@ -155,13 +155,13 @@ class Cubic(Surface):
 
 @dataclass(frozen=True)
 class Axicon(Surface):
-    """A cone: OPL = −slope·r, so that every ray bends towards the axis by the same slope.
+    """A cone: OPL = −slope·r, so that every ray is deflected towards the axis by the same slope.
 
-    The point at r = 0, where a cone has no gradient, bends nothing. (McLeod, The axicon: a new type of optical
+    At r = 0, where a cone has no gradient, the deflection is 0. (McLeod, The axicon: a new type of optical
     element, Journal of the Optical Society of America 44, 1954.)
 
     Args:
-        slope: dimensionless; negative bends rays away from the axis. A cone of base angle γ and index n has
+        slope: dimensionless; negative deflects rays away from the axis. A cone of base angle γ and index n has
             about (n − 1)·γ.
 
     Raises:
@@ -186,7 +186,7 @@ class Axicon(Surface):
 
     @property
     def affine(self) -> Affine | None:
-        """Nothing where the slope is 0."""
+        """The identity if the slope is 0."""
         return Affine.identity() if self.slope == 0 else None
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:

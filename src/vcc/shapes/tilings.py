@@ -1,4 +1,4 @@
-"""Rectangles along the axes that tile the plane as a lattice's parallelograms do."""
+"""Axis-parallel rectangles that tile the plane like the parallelograms of a lattice."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 ALIKE = 1e-6
-"""Coverings whose spreads differ by less, as a share, are equally compact."""
+"""Coverings whose spreads differ by a smaller share are equally compact."""
 ROUNDING = 1e-9
-"""Of a cell's area: a second rectangle below it is rounding."""
+"""Share of a cell's area below which a second rectangle counts as rounding."""
 
 
 class Tile(NamedTuple):
-    """A rectangle of a cell: its middle from that of the cell, its size, and its weight in the cell's mean."""
+    """A rectangle of a cell: its middle relative to the cell's, its size, and its weight in the cell's mean."""
 
     x: float
     y: float
@@ -28,13 +28,13 @@ class Tile(NamedTuple):
 
 
 def tiles_of(step: Array) -> tuple[Tile, ...]:
-    """Rectangles, weighted, whose copies at all points of a lattice cover the plane evenly.
+    """Rectangles, weighted, whose copies at all points of a lattice cover the plane uniformly.
 
     Two vectors (a, b) and (−c, d) of the lattice, none of a, b, c, d below 0, have cells of area a·d + b·c: a
     rectangle of a×d and one of c×b side by side, as squares on the sides of a right-angled triangle tile the plane
-    (the Pythagorean tiling). So means over cells of any lattice can be had from means over rectangles, and their
-    sum over the plane is exact. The smaller one may stand on either side of the larger: it stands on both, with
-    half its weight, so that cameras and their mirror images are treated alike.
+    (the Pythagorean tiling). So means over cells of any lattice can be computed from means over rectangles, and
+    their sum over the plane is exact. The smaller rectangle may be on either side of the larger one: both sides
+    are used, with half the weight, so that cameras and their mirror images are treated alike.
 
     Args:
         step: 2×2, the vectors of the lattice as columns, linearly independent.
@@ -44,7 +44,7 @@ def tiles_of(step: Array) -> tuple[Tile, ...]:
     best = [
         tiles for tiles, spread in zip(coverings, spreads, strict=True) if spread <= spreads.min() * (1 + ALIKE)
     ]
-    weights: dict[tuple[float, float, float, float], float] = {}  # of squares turned by 45 degrees, all
+    weights: dict[tuple[float, float, float, float], float] = {}  # of squares rotated by 45 degrees, all
     for tile in (tile for tiles in best for tile in tiles):
         place = next((one for one in weights if np.allclose(one, tile[:4], atol=ALIKE * tile.width)), tile[:4])
         weights[place] = weights.get(place, 0.0) + tile.share / len(best)
@@ -64,7 +64,7 @@ def _reduced(step: Array) -> Array:
 
 
 def _coverings(step: Array) -> list[tuple[Tile, ...]]:
-    """The coverings by all pairs of short vectors of a lattice that lie as `tiles_of` wants them."""
+    """The coverings by all pairs of short vectors of a lattice with the orientation that `tiles_of` requires."""
     found: list[tuple[Tile, ...]] = []
     for mixed in product((-1.0, 0.0, 1.0), repeat=4):
         change = np.array(mixed).reshape(2, 2)
@@ -79,7 +79,7 @@ def _coverings(step: Array) -> list[tuple[Tile, ...]]:
             continue
         area = a * d - b * c
         large = Tile(0.0, 0.0, float(a), float(d), float(a * d / area))
-        # To the right and below, flush with a corner; (c, d) leads from one to the other.
+        # To the right and below, flush with a corner; (c, d) is the vector between them.
         beside = np.array([a + abs(c), math.copysign(1, b) * (abs(b) - d)]) / 2
         below = np.array([math.copysign(1, b) * (a - abs(c)), d + abs(b)]) / 2
         for x, y in (beside, below):

@@ -19,13 +19,13 @@ from vcc.shapes.patterns import is_grid
 from vcc.shapes.surface import Array, Surface, places
 
 ROWS_AT_ONCE = 16
-"""Of a grid of places: what is computed of some hundred columns stays in the cache."""
+"""Rows of a grid of places that are computed together: results for some hundred columns stay in the cache."""
 PLACES_AT_ONCE = 4096
-"""Likewise."""
+"""Places that are computed together, likewise."""
 LARGE_GRID = 4
-"""Times as many places as fix a polynomial: on larger grids it is interpolated."""
+"""Times the number of places that determine a polynomial: larger grids are interpolated."""
 ROUNDING = 1e-8
-"""Of slopes in the disc, that interpolation may round."""
+"""Rounding error allowed in interpolation, as a share of the slopes in the disc."""
 
 Waves = NDArray[np.complex128]
 
@@ -35,8 +35,8 @@ class Zernike(Surface):
     """Aberrations of a lens as a sum of Zernike polynomials in Noll's order: OPL = Σⱼ aⱼ·Zⱼ(ρ, θ).
 
     The polynomials are orthonormal over the disc (Noll, Zernike polynomials and atmospheric turbulence, Journal
-    of the Optical Society of America 66, 1976, eq. 1 and table I): over it, the root mean square of a path is
-    √(Σ aⱼ²) with piston (j = 1) left out. ρ = r/R, and θ runs from x towards y, which is downwards here.
+    of the Optical Society of America 66, 1976, eq. 1 and table I): over the disc, the root mean square of a path
+    is √(Σ aⱼ²) without piston (j = 1). ρ = r/R, and θ runs from x towards y, which is downwards here.
 
     | j  | name                | Zⱼ                   |
     |----|---------------------|----------------------|
@@ -50,10 +50,10 @@ class Zernike(Surface):
     | 8  | coma along x        | √8 (3ρ³ − 2ρ) cos θ  |
     | 11 | spherical           | √5 (6ρ⁴ − 6ρ² + 1)   |
 
-    Beyond the disc the same polynomials go on, and grow fast.
+    Beyond the disc the same polynomials continue, and grow fast.
 
     Args:
-        coefficients: a₁, a₂, a₃, …, metres of optical path, as many as wanted; see `from_terms` for few.
+        coefficients: a₁, a₂, a₃, …, metres of optical path, any number; see `from_terms` for few terms.
         diameter: 2R of the disc, metres.
 
     Raises:
@@ -80,7 +80,7 @@ class Zernike(Surface):
             diameter: of the disc, metres.
 
         Raises:
-            InputError: no terms, a number below 1, and as for the class.
+            InputError: no terms, a number below 1, or as for the class.
         """
         if not terms or not all((checks.whole_number(j) or 0) >= 1 for j in terms):
             raise InputError(f"terms of a Zernike surface are numbered 1, 2, 3, … after Noll, not {list(terms)}")
@@ -100,7 +100,7 @@ class Zernike(Surface):
         return self._in_pieces(path, 1, x, y)[0]
 
     def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """The sum of the terms' gradients, in closed form; on large grids by interpolation that is as exact."""
+        """The sum of the terms' gradients, in closed form; on large grids by equally exact interpolation."""
         across, down = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
         if is_grid(across, down) and self._interpolates(across, down):
             return self._interpolated(across, down)
@@ -127,9 +127,9 @@ class Zernike(Surface):
         return max((noll(j)[0] for j, _ in self._terms), default=0)
 
     def _interpolates(self, x: Array, y: Array) -> bool:
-        """Whether a polynomial through few places gives all of a grid, to `ROUNDING` of what it is in the disc.
+        """Whether a polynomial through few places determines a grid within `ROUNDING` of its values in the disc.
 
-        Beyond the disc terms of order n grow as (ρ + √(ρ² − 1))ⁿ, and what is rounded there is rounded everywhere.
+        Beyond the disc, terms of order n grow as (ρ + √(ρ² − 1))ⁿ, and rounding errors there affect all places.
         """
         if x.size * y.size < LARGE_GRID * (self._order + 1) ** 2:
             return False
@@ -138,7 +138,7 @@ class Zernike(Surface):
         return growth < math.log(ROUNDING / np.finfo(np.float64).eps)
 
     def _interpolated(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """The slopes on a grid, by Chebyshev polynomials through as many places as fix them."""
+        """The slopes on a grid, by Chebyshev polynomials through as many places as determine them."""
         degree = max(self._order - 1, 0)
         nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
         fixed = np.linalg.inv(chebvander(nodes, degree))
@@ -153,7 +153,7 @@ class Zernike(Surface):
 
     @property
     def _by_frequency(self) -> list[NDArray[np.complex128]]:
-        """Sums of terms of one angular frequency m = 0, 1, … are Re wᵐ·Σₖ cₖ·P_k^(0, m): their cₖ."""
+        """Sums of terms of each angular frequency m = 0, 1, … are Re wᵐ·Σₖ cₖ·P_k^(0, m): the coefficients cₖ."""
         found: dict[int, dict[int, complex]] = {}
         for j, coefficient in self._terms:
             term = _Term.of(j)
@@ -168,7 +168,7 @@ class Zernike(Surface):
     def _in_pieces(
         self, of: Callable[[Waves, Array], tuple[Array, ...]], count: int, x: ArrayLike, y: ArrayLike
     ) -> tuple[Array, ...]:
-        """What a function gives at places, so few at once that what is computed of them stays in the cache."""
+        """Values of a function at places, computed in pieces small enough for the cache."""
         across, down = places(x, y)
         found = tuple(np.empty(across.shape) for _ in range(count))
         flat = [each.reshape(-1) for each in found]
@@ -180,7 +180,7 @@ class Zernike(Surface):
         return found
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
-        """See `Surface`; here to the coefficients."""
+        """See `Surface`; for the coefficients."""
         found = np.zeros(len(self.coefficients))
         for first in range(0, y.size, ROWS_AT_ONCE):
             rows = slice(first, first + ROWS_AT_ONCE)
@@ -193,7 +193,7 @@ class Zernike(Surface):
 
     @property
     def _terms(self) -> list[tuple[int, float]]:
-        """Noll's numbers of the terms other than 0, and their coefficients."""
+        """Noll's numbers of the terms that are not 0, and their coefficients."""
         return [(j, coefficient) for j, coefficient in enumerate(self.coefficients, start=1) if coefficient != 0]
 
     def _within_disc(self, x: Array, y: Array) -> tuple[NDArray[np.complex128], Array]:
@@ -203,7 +203,7 @@ class Zernike(Surface):
 
     @property
     def affine(self) -> Affine | None:
-        """A prism, a lens and a cylinder lens, where no term beyond astigmatism (j = 6) is other than 0."""
+        """A prism, a lens and a cylinder lens, if all terms beyond astigmatism (j = 6) are 0."""
         if any(self.coefficients[6:]):
             return None
         radius = self.diameter / 2
@@ -225,13 +225,13 @@ class Zernike(Surface):
 class _Term:
     """One polynomial: its norm × Re or Im of wᵐ × a Jacobi polynomial P_k^(0, m) of 2ρ² − 1, w = (x + iy)/R.
 
-    So there is no angle and no division by ρ, and the rest is evaluated by recurrence.
+    This form needs no angle and no division by ρ; the rest is evaluated by recurrence.
 
     Args:
-        norm: which makes it orthonormal.
+        norm: makes it orthonormal.
         k: (n − m)/2.
         m: angular frequency.
-        sine: whether it goes with sin mθ.
+        sine: whether it has the factor sin mθ.
     """
 
     norm: float
@@ -286,7 +286,7 @@ def _weighted(coefficients: NDArray[np.complex128], polynomials: Array) -> Waves
 
 
 def _jacobi(count: int, a: int, b: int, argument: Array) -> Array:
-    """The first so many of Jacobi's polynomials P_k^(a, b), shape (count, places).
+    """The first ``count`` Jacobi polynomials P_k^(a, b), shape (count, places).
 
     By their recurrence over k (Abramowitz and Stegun, Handbook of Mathematical Functions, 22.7.1).
     """
@@ -306,7 +306,7 @@ def _jacobi(count: int, a: int, b: int, argument: Array) -> Array:
 def noll(j: int) -> tuple[int, int]:
     """(n, m) of Noll's term j = 1, 2, 3, …: radial order and angular frequency, m ≥ 0.
 
-    Even j go with cos mθ, odd j with sin mθ (Noll 1976, eq. 1).
+    Even j have the factor cos mθ, odd j sin mθ (Noll 1976, eq. 1).
     """
     n = (math.isqrt(8 * j - 7) - 1) // 2
     place = j - n * (n + 1) // 2  # 1 … n + 1 within the row of order n

@@ -33,7 +33,7 @@ class AbsorbingChoices:
 
 
 def choose_absorbing(train: Train, landing: Landing) -> AbsorbingChoices:
-    """Choose the planes in which masks are combined: those in which samples meet several masks in one place."""
+    """Choose the planes in which masks are combined: masks that samples meet in one place."""
     groups = _in_one_place(train, landing)
     return AbsorbingChoices(
         tuple(len(stages) for _, stages in groups),

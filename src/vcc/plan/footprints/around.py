@@ -27,8 +27,8 @@ LARGEST_SHEARED_FILTER = 6
 """Weights on each side of the middle of a filter for a sheared pixel grid."""
 FAR = 2**24
 """Largest number of pixels of the sensor and the margin that the sharpening filter reads, two samples on each
-side. Above it, if a sample is a thousand pixels wide, samples are interpolated by cubics without a filter: 41 to
-50 dB instead of 43 to 45 dB (sharp) and 33 to 39 dB (linear), for cosines of 5.5 samples."""
+side. Above it (a sample is then about a thousand pixels wide) samples are interpolated by cubics without a filter:
+41 to 50 dB, where sharp images have 43 to 45 dB and linear ones 33 to 39 dB (cosines of 5.5 samples)."""
 ROOM = 1.25
 """Factor by which the gap between views may grow if it follows a camera."""
 LARGEST_RASTER = 2**28
@@ -214,8 +214,7 @@ def _sharpening(core: Footprints, sample: Sample) -> tuple[float, Footprints]:
 
 
 def choose_sharp_footprint(step: Array, divided: SampleDivision) -> str:
-    """Choose the footprint that is sharpened: a tent, which is fast, or a spline if pixels resolve the tent's
-    kinks.
+    """Choose the footprint to sharpen: a tent, which is fast, or a spline if pixels resolve a tent's kinks.
 
     Behind hard edges, divided samples fill their own cells, because the mask cuts them off there.
     """

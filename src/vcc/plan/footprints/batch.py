@@ -41,7 +41,7 @@ class Apart(NamedTuple):
 
     Args:
         error: error of the image if cells are divided into so many parts each way, a share of its light.
-        share: of the rays in whose cells several elements vary.
+        share: share of the rays whose cells contain several varying elements.
         even: for each group, whether it transmits the same light at all sampled places.
     """
 
@@ -152,7 +152,7 @@ class Looks(Brief):
 
 
 def _linear(first: Array, means: list[Array], others: list[Array]) -> Array:
-    """Linear part of what other elements do to the light in the middle of the first element's open part."""
+    """Linear effect of the other elements on the light in the middle of the first element's open part."""
     each = first.shape[-1]
     place = (np.arange(each) - (each - 1) / 2) / max(math.sqrt((each**2 - 1) / 12), 1e-300)
     total = np.zeros(means[0].shape)

@@ -162,7 +162,7 @@ def divide_views(
     Args:
         view_planes: masks at the views.
         path_planes: masks in mid-path.
-        between: what is between views.
+        between: interpolation between views.
         geometry: of the samples.
         refine: "auto", or the number requested.
         detail: detail measured on the patterns.

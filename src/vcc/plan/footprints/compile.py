@@ -65,7 +65,7 @@ class FootprintChoices(Brief):
     Args:
         on_sensor: how means of masks against the sensor are computed.
         landing: how samples are brought to the sensor.
-        between: what is between views.
+        between: interpolation between views.
         absorbing: the planes in which masks are combined.
         at_views: for each plane in mid-path, whether it becomes one weight a view.
         cells: how the cells of views are divided.
@@ -213,7 +213,7 @@ class ByFootprints:
             by_masks_against_sensor(self.sensor, absorbing.against_sensor, means, place, within),
         )
 
-    # --- where samples fall, and what they meet
+    # --- places of samples, and masks that they meet
 
     @property
     @cached
@@ -224,19 +224,19 @@ class ByFootprints:
     @property
     @cached
     def landing(self) -> Landing:
-        """Where samples fall on the sensor."""
+        """Places of samples on the sensor."""
         return Landing.of(self.train, self.grid, self.choose_landing)
 
     @property
     @cached
     def choose_between(self) -> BetweenViews:
-        """What is between views."""
+        """The interpolation between views."""
         return choose_between_views(self.grid, self.landing.frame, self.landing.pixels, self.how)
 
     @property
     @cached
     def between(self) -> BetweenViews:
-        """What is between views, for the current optics."""
+        """The interpolation between views, for the current optics."""
         return self.choose_between.now(self.grid, self.landing.pixels)
 
     @property
@@ -380,7 +380,7 @@ class ByFootprints:
         """How the textures of the masks were made."""
         return tuple(made for _, made in self.looked_up)
 
-    # --- the core, and what is done around it
+    # --- the core, and the operators around it
 
     @property
     @cached
@@ -475,7 +475,7 @@ class ByFootprints:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the plan does, as text."""
+        """Decisions of the plan, as text."""
         cells, samples, absorbing = self.choose_cells, self.choose_samples, self.absorbing
         of_masks = "as asked" if self.how.refine != "auto" else "a mask near the sensor is finer than a sample"
         turned = samples.parts == self.geometry.parts

@@ -257,8 +257,7 @@ def _losses(kernel: Kernel, steps_from_slopes: Array, weights: Array) -> list[fl
 
 
 def _filtered(weights: Array, along: Array, axis: int) -> Array:
-    """Weights convolved along one axis with an odd number of weights, which lengthens them by this number less
-    one.
+    """Weights convolved along one axis with an odd number n of weights, which adds n − 1 weights there.
 
     Each axis is filtered separately: a wide kernel has millions of weights.
     """

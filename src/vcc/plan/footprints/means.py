@@ -1,6 +1,6 @@
 """Means of patterns over rectangles that follow the rectangles and the patterns smoothly.
 
-A pattern without a closed-form mean is sampled on a raster. If the raster were chosen anew for each camera, its
+A pattern without a closed-form mean is sampled on a raster. If the raster were chosen for each camera, its
 points would move with the rectangles, and hard edges would jump from point to point. If parameters follow a
 camera, the raster is therefore chosen once and stays fixed on the pattern; means of the raster values are exact.
 """

@@ -90,7 +90,7 @@ class Footprints(Value):
 
     Args:
         raster_shape: (rows, columns) of pixels.
-        interpolation: of footprints: ``"nearest"``, ``"linear"``, ``"cubic"`` or ``"spline"``.
+        interpolation: of footprints: ``"nearest"``, ``"linear"``, ``"cubic"``, ``"spline"`` or ``"box"``.
         scale: converts radiance times shares into irradiance.
         view_rows: row of views that each row of taps reads.
         view_columns: column of views that each column of taps reads.

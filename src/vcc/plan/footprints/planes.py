@@ -92,15 +92,14 @@ class Plane(Brief):
         return cls.at((rays @ frame).matrix[:2], [(pattern, decentre)], label)
 
     def middle_of_view(self, samples: tuple[int, int]) -> Array:
-        """Where the middle of view (0, 0) falls, (x, y) in metres; views have (rows, columns) of samples."""
+        """Place (x, y) of the middle of view (0, 0), metres; ``samples`` are (rows, columns) of a view."""
         rows, columns = samples
         return np.asarray(self.offset + self.sample_step @ np.array([(columns - 1) / 2, (rows - 1) / 2]))
 
     def boxes(
         self, index: Array, shift: Array, motion: Array, samples: tuple[int, int], parts: int = 1
     ) -> list[tuple[Boxes, float]]:
-        """The cells of taps on a plane that each view meets in one point, as rectangles and their shares of a
-        cell.
+        """The cells of taps on a plane that each view meets in a point, as rectangles and their shares of a cell.
 
         Args:
             index: of the views, (rows of taps, columns of taps, 2); see `tap_origin`.

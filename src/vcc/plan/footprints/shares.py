@@ -96,7 +96,7 @@ def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: 
     it (forward); if they are further apart, each pixel takes the sample nearest to its middle (backward).
 
     Args:
-        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        interpolation: a key of `REACH`.
         pixel: pixel indices, as floating point.
         position: the samples' pixel coordinates.
         step: pixels from one sample to the next, of any sign, not 0.
@@ -143,7 +143,7 @@ def reach_in_pixels(interpolation: str, size: float) -> float:
     """The largest distance in pixels between a sample and the middle of a pixel that receives a share.
 
     Args:
-        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        interpolation: a key of `REACH`.
         size: pixels from one sample to the next, greater than 0.
     """
     reach = max(size, 1.0) / 2 if interpolation == "nearest" else REACH[interpolation] * size + 0.5
@@ -205,7 +205,7 @@ def taps(
     """The table of shares for rows of samples at ``origin + step · index``, in pixels.
 
     Args:
-        interpolation: ``"nearest"``, ``"linear"`` or ``"cubic"``.
+        interpolation: a key of `REACH`.
         origin: pixel coordinate of sample 0, any shape; the table has one row for each.
         step: pixels from one sample to the next.
         samples: number of samples.

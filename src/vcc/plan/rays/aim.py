@@ -1,8 +1,8 @@
-"""Where rays are aimed on their way back from the sensor: at the smallest window that light can come through.
+"""The aim of rays on their way back from the sensor: the smallest window through which light can arrive.
 
-Rays are bound by strips of slopes, whose width depends on how far rays stray, and that on where they meet what
-bends them, so on the aim: it is sought in rounds. Before lens arrays each cell may have a window of its own. All
-bounds are in `vcc.plan.rays.bounds`.
+Rays are bounded by strips of slopes. The width of the strips depends on the deviation of rays from affine optics,
+the deviation on where rays meet deflecting elements, and this on the aim: the aim is found by iteration. In
+front of a lens array each cell may have its own window. All bounds are in `vcc.plan.rays.bounds`.
 """
 
 from __future__ import annotations
@@ -27,26 +27,26 @@ from vcc.plan.rays.path import Leg, Path, stops_in_one_plane
 Array = NDArray[np.float64]
 
 ROUNDS = 8
-"""Plates deflect by where they are met, and are met by how they deflect: bounds are refined so often."""
+"""Largest number of iterations: the deflection of a plate depends on where rays meet it, and vice versa."""
 ROOM = 1.1
-"""By how much more what bends rays may bend them where their aim follows a camera."""
+"""Factor by which deflections may grow if the aim follows a camera."""
 SETTLED = 0.01
-"""Share of the deflections' bounds by which they change where no more rounds are needed."""
+"""Relative change of the bounds of deflections below which the iteration ends."""
 WORTH_NARROWING = 0.7
-"""Share of the solid angle asked for below which a smaller one is aimed at; likewise for windows of cells."""
+"""Share of the requested solid angle below which a smaller one is used; likewise for windows of cells."""
 NOWHERE = Window(np.zeros((2, 2)), np.zeros((2, 2)), np.zeros(2), False, "nothing")
-"""For how far rays stray where that is the same for any aim."""
+"""For deviations of rays that do not depend on the aim."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Aimed(Brief):
-    """An aim, and what it was found by.
+    """An aim, and how it was found.
 
     Args:
-        aim: where to.
-        regions: for each leg (low, high) between which rays that are aimed so meet its stage, metres.
-        deflections: by how much rays can stray, by which it was found.
-        everything: whether of all bounds (`vcc.plan.rays.bounds.slopes.bounds`).
+        aim: of the rays.
+        regions: for each leg (low, high) between which aimed rays meet its stage, metres.
+        deflections: the deviations of rays for which it was found.
+        everything: whether all bounds were used (`vcc.plan.rays.bounds.slopes.bounds`).
     """
 
     aim: Aim
@@ -57,13 +57,13 @@ class Aimed(Brief):
 
 @dataclass(frozen=True)
 class StopChoices:
-    """What stops are, by which rays are aimed.
+    """Properties of stops that the aim depends on.
 
     Args:
-        in_one_plane: the numbers of stages that stand in the plane of the one before, where one stops light.
-        rounds: which legs' stops are round.
-        bound: whether stops bound the light; None where all bounds count.
-        borders: how many sides of cells do not lie along the axes; None where cells have no windows.
+        in_one_plane: the numbers of stages in the same plane as the stage before, if one of them stops light.
+        rounds: for each leg, whether its stop is round.
+        bound: whether stops bound the light; None if all bounds are used.
+        borders: number of sides of cells that are not parallel to the axes; None if cells have no windows.
     """
 
     in_one_plane: tuple[int, ...] = choice("which stops stand in one plane")
@@ -75,7 +75,7 @@ class StopChoices:
 
     @classmethod
     def of(cls, path: Path, everything: bool) -> StopChoices:
-        """What stops are now, but for cells."""
+        """The current properties, without those of cells."""
         rounds, bound = tuple(map(is_round, path.legs)), None if everything else path.stops_bound
         return cls(stops_in_one_plane(path.train.stages), rounds, bound, None)
 
@@ -84,10 +84,10 @@ class StopChoices:
         return replace(self, borders=len(aim.opening.borders) if isinstance(aim, CellWindows) else None)
 
     def check(self, now: StopChoices) -> None:
-        """Check that stops are what they were.
+        """Check that the stops are unchanged.
 
         Raises:
-            InputError: they are not.
+            InputError: they have changed.
         """
         for each in fields(self):
             check_unchanged(each.metadata["words"], getattr(self, each.name), getattr(now, each.name))
@@ -95,16 +95,16 @@ class StopChoices:
 
 @dataclass(frozen=True)
 class AimChoices:
-    """What of an aim is chosen; its numbers follow the optics.
+    """Choices of an aim; its numbers follow the optics.
 
     Args:
-        stops: what they are.
+        stops: their properties.
         rounds: see `vcc.plan.rays.path.Path`.
         everything: see `vcc.plan.rays.bounds.slopes.bounds`.
-        bends: by how much each leg's stage bends rays at most, with room; None: as it does now, however much.
+        bends: largest deflection by each leg's stage, with room; None: its current deflection, without a limit.
         slope_bounds: the two that form the window; None if cells have their own windows.
-        towards: (number of the leg, words) of the bound that cells look at; None for a window.
-        reach: (rows, columns) of cells that are looked at on each side.
+        towards: (number of the leg, words) of the bound seen through the cells; None for a window.
+        reach: (rows, columns) of cells on each side that are used.
         halvings: of the rays of a pixel.
     """
 
@@ -118,12 +118,12 @@ class AimChoices:
     halvings: int = 0
 
     def like(self, other: AimChoices) -> bool:
-        """Whether both aim at the same, by as many rays."""
+        """Whether both aim at the same bounds, with equally many rays."""
         return replace(self, bends=(), towards=None) == replace(other, bends=(), towards=None)
 
 
 def choose_aim(path: Path) -> AimChoices:
-    """Where to aim, with room for what bends rays to bend them further.
+    """Choose the aim, with room for larger deflections.
 
     Raises:
         InputError: nothing bounds the rays.
@@ -134,7 +134,7 @@ def choose_aim(path: Path) -> AimChoices:
 
 
 def _rounds(path: Path, kept: AimChoices) -> tuple[bool, ...]:
-    """Which stops are smaller for being taken for round, by how far rays stray that are aimed so."""
+    """For each stop, whether it is smaller if it stays round when widened by the deviation of aimed rays."""
     _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), kept.bends)
     if kept.towards is None:
         stops = bounds(path, deflections.unknown, kept.everything)[: len(path.legs)]
@@ -145,7 +145,7 @@ def _rounds(path: Path, kept: AimChoices) -> tuple[bool, ...]:
 
 
 def _with_room(path: Path, taken: Aimed) -> AimChoices:
-    """What of an aim that was found is chosen."""
+    """Choices of an aim that was found."""
     aim, stops = taken.aim, StopChoices((), (), None, None)
     largest = [largest_bend(leg, region) for leg, region in zip(path.legs, taken.regions, strict=True)]
     bends = tuple(
@@ -154,14 +154,14 @@ def _with_room(path: Path, taken: Aimed) -> AimChoices:
     )
     if isinstance(aim, CellWindows):
         kept = AimChoices(stops, (), taken.everything, bends, None, aim.towards, aim.reach, aim.halvings)
-        for _ in range(2):  # the cells that are seen by all that can stray, and may bend others
+        for _ in range(2):  # the cells that all deviating rays see, and which may deflect others
             _, deflections = regions_and_deflections(path, aim, bends)
             wider = cell_windows.cell_windows_towards(path, deflections.whole, kept.everything, *aim.towards)
             if wider is not None:
                 return replace(kept, bends=bends, reach=wider.reach)
             bends = tuple(
                 None if room is None else most for room, most in zip(bends, largest, strict=True)
-            )  # more cells than are looked at one by one: no room
+            )  # more cells than can be used separately: no room
         return kept
     pair = next(
         pair
@@ -172,15 +172,15 @@ def _with_room(path: Path, taken: Aimed) -> AimChoices:
 
 
 def _as_much_as_it_likes(path: Path, kept: AimChoices) -> AimChoices:
-    """A kept window, with room only for what bends rays before they are where it counts.
+    """A kept window, with room only for elements whose deflections affect it.
 
-    What stands where the window is, or before all that has a texture, may bend rays as much as it likes.
+    Elements in the plane of the window, or in front of all textures, may deflect rays by any amount.
     """
     pair = kept.slope_bounds
     assert pair is not None
 
     def led_to(bends: tuple[Slopes, ...]) -> Array:
-        """Where rays are aimed, and where they then meet each stage, in one row."""
+        """The aim, and the regions in which rays then meet each stage, in one row."""
         _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), bends)
         aim = window_of(path, deflections.unknown, kept.everything, pair)
         regions, _ = regions_and_deflections(path, aim, bends)
@@ -196,20 +196,20 @@ def _as_much_as_it_likes(path: Path, kept: AimChoices) -> AimChoices:
 
 
 def _the_same_anywhere(leg: Leg) -> bool:
-    """Whether what bends rays bends them by as much wherever they meet it, and needs no room."""
+    """Whether the largest deflection of an element is the same everywhere, so that it needs no room."""
     return isinstance(leg.stage.faces.bending, CellDeflection | FacetDeflection)
 
 
 def aim_now(path: Path, kept: AimChoices) -> Aimed:
-    """The aim that was chosen, as the optics are now.
+    """The chosen aim for the current optics.
 
     Raises:
-        InputError: stops are no longer what they were, or rays leave what there is room for.
+        InputError: stops have changed, or rays deviate by more than the room for them.
     """
     stops, as_chosen = StopChoices.of(path, kept.everything), replace(path, rounds=kept.rounds)
     kept.stops.check(replace(stops, borders=kept.stops.borders))
     _, deflections = regions_and_deflections(path, _chosen(path, DeflectionBounds.none(path), kept), kept.bends)
-    # Without what rays stray by, more cells may seem to be seen than are.
+    # Without the deviation of rays, more cells may seem to be visible than are.
     aim = _with_kept_reach(_chosen(as_chosen, deflections, kept), kept)
     kept.stops.check(stops.through(aim))
     regions, _ = regions_and_deflections(path, aim, kept.bends)
@@ -221,7 +221,7 @@ def aim_now(path: Path, kept: AimChoices) -> Aimed:
 
 
 def _chosen(path: Path, deflections: DeflectionBounds, kept: AimChoices) -> Aim:
-    """The window, or the windows of cells, that were decided on."""
+    """The window, or the windows of cells, that were chosen."""
     if kept.slope_bounds is not None:
         return window_of(path, deflections.unknown, kept.everything, kept.slope_bounds)
     assert kept.towards is not None
@@ -232,7 +232,7 @@ def _chosen(path: Path, deflections: DeflectionBounds, kept: AimChoices) -> Aim:
 
 
 def _with_kept_reach(aim: Aim, kept: AimChoices) -> Aim:
-    """The aim with as many cells as were looked at, which are enough."""
+    """The aim with the chosen number of cells, which is sufficient."""
     if not isinstance(aim, CellWindows):
         return aim
     if aim.reach[0] > kept.reach[0] or aim.reach[1] > kept.reach[1]:
@@ -241,7 +241,7 @@ def _with_kept_reach(aim: Aim, kept: AimChoices) -> Aim:
 
 
 def found(path: Path) -> Aimed:
-    """Where to aim: at all that the camera asks for, or at what of it the light field holds, where that is less.
+    """The aim at all light that the camera requests, or at the part that the light field contains, if smaller.
 
     Raises:
         InputError: nothing bounds the rays.
@@ -252,7 +252,7 @@ def found(path: Path) -> Aimed:
 
 
 def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
-    """The smallest aim, with the bounds of deflections by which it was found.
+    """The smallest aim, with the bounds of deflections for which it was found.
 
     Args:
         path: from the sensor.
@@ -269,7 +269,7 @@ def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
         aim = smallest(path, deflections, everything, windows_only)
         regions, further = regions_and_deflections(path, aim)
         if further.same(deflections) and deflections.size <= UNBOUNDED:
-            return Aimed(aim, regions, deflections, everything)  # another round would find the same
+            return Aimed(aim, regions, deflections, everything)  # another iteration would find the same
         deflections = further
         if abs(deflections.size - before) <= SETTLED * before < math.inf:
             break
@@ -278,18 +278,18 @@ def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
         before = deflections.size
     else:
         _refuse(path)
-    aim = smallest(path, deflections, everything, windows_only)  # once more, with all that rays can stray by
+    aim = smallest(path, deflections, everything, windows_only)  # once more, with the full deviation of rays
     return Aimed(aim, regions_and_deflections(path, aim)[0], deflections, everything)
 
 
 def _strays_alike(path: Path) -> bool:
-    """Whether rays stray as far wherever they are aimed: through lenses, lenslets and prisms alone."""
+    """Whether the deviation of rays does not depend on the aim: with lenses, lenslets and prisms only."""
     bent = [leg for leg in path.legs if leg.stage.faces.bending is not None]
     return not path.scatters and all(_the_same_anywhere(leg) for leg in bent)
 
 
 def _refuse(path: Path) -> NoReturn:
-    """Say which elements leave the rays without a bound."""
+    """Raise an error that names the elements that leave the rays unbounded."""
     bending = [leg.stage.element.label for leg in path.legs if leg.stage.faces.bending is not None]
     scattering = [leg.stage.element.label for leg in path.legs if leg.stage.faces.spread is not None]
     if bending:
@@ -300,10 +300,10 @@ def _refuse(path: Path) -> NoReturn:
 
 
 def smallest(path: Path, deflections: DeflectionBounds, everything: bool, windows_only: bool = False) -> Aim:
-    """The aim that takes in the smallest solid angle, or parts it where elements are not smooth.
+    """The aim with the smallest solid angle, or one that is divided where elements are not smooth.
 
-    Windows of cells are aimed at where they save rays, and where a pixel's rays are enough for all cells that
-    it sees: what a pixel sees jumps from cell to cell, and is smooth in each.
+    Windows of cells are used if they save rays, and if a pixel has enough rays for all cells that it sees: the
+    integrand jumps from cell to cell, and is smooth within each.
     """
     found = windows(path, deflections.unknown, everything)
     if not found:
@@ -314,7 +314,7 @@ def smallest(path: Path, deflections: DeflectionBounds, everything: bool, window
 
 
 def _parted(path: Path, whole: Window, cells: CellWindows, seen: cell_windows.Seen) -> Aim:
-    """The cells where that pays, else the window as a whole."""
+    """The cells if that pays, else the window as a whole."""
     if seen.solid_angle < WORTH_NARROWING * whole.solid_angle:
         return cells
     halvings = round(math.log2(max(seen.cells, 1.0)))

@@ -1,8 +1,8 @@
-"""Aims gone through backwards: what slopes and weights of rays say of their places and of the aim's numbers.
+"""Backward pass through aims: gradients of places and of the aim's parameters from those of slopes and weights.
 
-As in `vcc.plan.rays.backwards`. Rays through cells are followed line by line as `CellWindows.rays_through` makes
-them; where it takes the lower or the higher of two borders, the one that was taken gets all. What ends in ``bar``
-is the cotangent of what is named before it.
+See `vcc.plan.rays.backwards`. For rays through cells, the code follows `CellWindows.rays_through` line by line;
+where that takes the lower or the higher of two borders, the taken border receives the whole cotangent. Names
+that end in ``bar`` are cotangents of the quantity named before.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ Array = NDArray[np.float64]
 
 
 def aim_back(aim: Aim, rays: Bundle, cells: Cell | None, behind: Bundle) -> tuple[Bundle, Numbers]:
-    """What aimed rays say of their places on the sensor, of what was drawn for them, and of the aim.
+    """Propagate cotangents of aimed rays to their places on the sensor, their random numbers and the aim.
 
     Args:
-        aim: where they are aimed.
-        rays: at the sensor, as `vcc.plan.rays.model.Rays.aimed` makes them.
+        aim: of the rays.
+        rays: at the sensor, as returned by `vcc.plan.rays.model.Rays.aimed`.
         cells: likewise.
-        behind: cotangents of all of them; of shares, of the solid angles that they stand for.
+        behind: cotangents of all of them; cotangents of shares are those of the solid angles.
 
     Returns:
-        Cotangents of x, y and points, and of the aim's numbers by the names that they have in it.
+        Cotangents of x, y and points, and of the aim's parameters by their names in it.
     """
     if isinstance(aim, Window):
         return _window_back(aim, rays, behind)
@@ -44,7 +44,7 @@ def _window_back(aim: Window, rays: Bundle, behind: Bundle) -> tuple[Bundle, Num
     at_window = np.stack([rays.points[..., 2], rays.points[..., 3]]).reshape(2, -1)
     at_sensor = np.stack([rays.x, rays.y]).reshape(2, -1)
     (a, b), (c, d) = aim.slope_from_point
-    cofactors = np.array([[d, -c], [-b, a]])  # d|det|/d(matrix), but for the sign
+    cofactors = np.array([[d, -c], [-b, a]])  # d|det|/d(matrix), up to the sign
     per_determinant = (np.pi if aim.disc else 4.0) * np.sign(np.linalg.det(aim.slope_from_point))
     own = {
         "slope_from_point": slopes @ at_window.T + behind.share.sum() * per_determinant * cofactors,
@@ -115,7 +115,7 @@ def _aimed_back(
     images: list[_Image],
     behind: tuple[Array, Array, Array],
 ) -> tuple[list[Array], list[_Image], Numbers]:
-    """What places in cells and areas (`CellWindows.aimed`) say of centres, of images and of the opening."""
+    """From cotangents of places and areas (`CellWindows.aimed`) to those of centres, images and opening."""
     across, down = 0.5 + 0.5 * points[..., 0], 0.5 + 0.5 * points[..., 1]
     (x, y), (centre_x, centre_y), reach = images, centres, aim.opening.half[0]
     left, right = (x.middle - x.half, centre_x - reach), (x.middle + x.half, centre_x + reach)
@@ -151,7 +151,7 @@ def _aimed_back(
 
 @dataclass(repr=False)
 class _Ends(Brief):
-    """Cotangents of the ends of what is seen: those of the stop's image, and those of the cell's opening."""
+    """Cotangents of the ends of the visible region: the ends of the stop's image, and of the cell's opening."""
 
     image_low: Array
     cell_low: Array
@@ -160,13 +160,13 @@ class _Ends(Brief):
 
 
 def _ends_back(low: tuple[Array, Array], high: tuple[Array, Array], first: Array, length: Array) -> _Ends:
-    """What the lower end and the length of what image and opening have in common say of the ends of both.
+    """From cotangents of the intersection of image and opening to cotangents of the ends of both.
 
     Args:
         low: lower ends (of the image, of the opening).
-        high: likewise.
-        first: cotangent of the lower end of what both have.
-        length: cotangent of its length, which is 0 at least.
+        high: higher ends, likewise.
+        first: cotangent of the lower end of the intersection.
+        length: cotangent of its length, which is clipped at 0.
     """
     length = np.where(np.minimum(*high) > np.maximum(*low), length, 0.0)
     first = first - length
@@ -182,7 +182,7 @@ def _ends_back(low: tuple[Array, Array], high: tuple[Array, Array], first: Array
 def _rows_back(
     opening: CellOpening, away: Array, rows: tuple[Array, Array], behind: tuple[Array, Array]
 ) -> tuple[Array, Numbers]:
-    """What the lowest and the highest y in an opening say of x and of the opening's borders."""
+    """From cotangents of the lowest and the highest y in an opening to those of x and of the opening's borders."""
     borders, radius = np.zeros(opening.borders.shape), 0.0
     away_bar = np.zeros_like(away)
     for n, (slope, half) in enumerate(opening.borders):
@@ -202,7 +202,7 @@ def _rows_back(
 
 @dataclass(repr=False)
 class _Seen(Brief):
-    """Cotangents of what an image follows from along one axis: of each ray."""
+    """Cotangents of the inputs of an image along one axis, for each ray."""
 
     place: Array
     centre: Array
@@ -213,7 +213,7 @@ class _Seen(Brief):
 def _image_back(
     aim: CellWindows, n: int, seen: tuple[Array, Array, Cell], image: _Image, behind: _Image
 ) -> tuple[_Seen, Numbers]:
-    """What the stop's image along axis n says of what it follows from: (place, centre, kind) and the numbers.
+    """From cotangents of the stop's image along axis n to those of (place, centre, kind) and of parameters.
 
     middle = (stop − rest) / gain, half = stop's half / |gain|, gain = beyond + P·beyond_from_slope,
     rest = beyond_from_sensor·place − beyond_from_slope·(P·centre + σ) + beyond_offset.

@@ -1,9 +1,9 @@
-"""Steps of rays gone through backwards: what rays behind a step say of those before it and of its numbers.
+"""Backward pass through steps of rays: gradients of the rays before a step and of its parameters.
 
-Each function here is the transpose of a derivative. A cotangent of a number is by how much a weighted sum of a
-picture grows with it; with those of the rays behind a step, every small change of what it computes obeys
-⟨cotangent behind, d(behind)⟩ = ⟨cotangent before, d(before)⟩ + Σ ⟨cotangent of a number, d(number)⟩. Which cell or
-facet holds a ray, whether it passes an edge and which kernel is picked do not change by small changes
+Each function here is the transpose of a derivative. The cotangent of a number is the derivative of a weighted
+sum of an image with respect to it. With the cotangents of the rays behind a step, every small change obeys
+⟨cotangent behind, d(behind)⟩ = ⟨cotangent before, d(before)⟩ + Σ ⟨cotangent of a parameter, d(parameter)⟩. The
+cell or facet that a ray meets, whether it passes an edge and the selected kernel do not depend on small changes
 (`vcc.plan.rays.edges`).
 """
 
@@ -25,7 +25,7 @@ Numbers = dict[str, Array]
 
 
 def back(step: Step, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
-    """What rays behind a step say of those before it.
+    """Propagate cotangents from the rays behind a step to the rays before it.
 
     Args:
         step: any of `vcc.plan.rays.steps`.
@@ -33,8 +33,8 @@ def back(step: Step, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
         behind: cotangents of the rays behind it.
 
     Returns:
-        Cotangents of the rays before it, and of the step's numbers by the names that they have in the step; those
-        that are not named there have the derivative zero.
+        Cotangents of the rays before it, and of the step's parameters by their names in the step; parameters
+        that are missing there have the derivative zero.
     """
     return _BACK[type(step)](step, before, behind)
 
@@ -45,7 +45,7 @@ def moved_back(matrix: Array, before: Bundle, behind: Array) -> tuple[Bundle, Ar
     Args:
         matrix: 5×5.
         before: rays.
-        behind: cotangents of what the map makes of (x, y, s, t), (…, 4).
+        behind: cotangents of the result (x, y, s, t) of the map, (…, 4).
 
     Returns:
         Cotangents of the rays' places and slopes, and of the matrix.
@@ -58,14 +58,14 @@ def moved_back(matrix: Array, before: Bundle, behind: Array) -> tuple[Bundle, Ar
 
 
 def lattice_back(lattice: Lattice, centre: tuple[Array, Array], behind: tuple[Array, Array]) -> Numbers:
-    """What centres of cells say of their lattice.
+    """Cotangents of a lattice from cotangents of centres of its cells.
 
-    A centre is offset + pitch · (turned steps of the lattice).
+    A centre is offset + pitch · (rotated steps of the lattice).
 
     Args:
         lattice: the cells.
         centre: (x, y) of cells.
-        behind: cotangents of them.
+        behind: cotangents of the centres.
     """
     (x, y), (gx, gy) = (centre[0] - lattice.offset[0], centre[1] - lattice.offset[1]), behind
     return {
@@ -76,13 +76,13 @@ def lattice_back(lattice: Lattice, centre: tuple[Array, Array], behind: tuple[Ar
 
 
 def texture_back(texture: Texture, x: Array, y: Array, behind: Array) -> tuple[Array, Array, Numbers]:
-    """What numbers looked up in a texture say of their places and of the texture.
+    """Cotangents of the places and of a texture from cotangents of values looked up in it.
 
     Args:
-        texture: what was looked up.
-        x: where.
+        texture: for the look-up.
+        x: places.
         y: likewise.
-        behind: cotangents of the numbers found, (…, numbers).
+        behind: cotangents of the values, (…, numbers).
     """
     size = texture.values.shape[1::-1]
     place = [(at - texture.start[n]) / texture.spacing[n] for n, at in enumerate((x, y))]
@@ -149,7 +149,7 @@ def _plate(step: steps.TextureUnbend, before: Bundle, behind: Bundle) -> tuple[B
 
 
 def _hole(step: Step, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
-    """Each ray passes or does not."""
+    """Each ray passes or is stopped."""
     weighed = replace(before, share=np.ones_like(before.share))
     step(weighed)
     return replace(behind, share=behind.share * weighed.share), {}
@@ -163,7 +163,7 @@ def _mask_of_cells(step: steps.CellShares, before: Bundle, behind: Bundle) -> tu
 
 
 def _cosines(step: steps.Cosines, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
-    """Shares are weighed by f(θx)·f(θy), with f = ½ + Σ cos(nθ)/2h and θ = frequency·(place − middle) + phase."""
+    """Shares are times f(θx)·f(θy), with f = ½ + Σ cos(nθ)/2h and θ = frequency·(place − middle) + phase."""
     orders = np.arange(1, step.harmonics + 1)
     away = [at - middle for at, middle in zip((before.x, before.y), step.middle, strict=True)]
     angles = [(f * at + step.phase)[..., None] * orders for f, at in zip(step.frequency, away, strict=True)]
@@ -194,7 +194,7 @@ def _mask(step: steps.TextureShares, before: Bundle, behind: Bundle) -> tuple[Bu
 
 
 def _diffuser(step: steps.Unscatter, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
-    """Slopes lose width · (what is drawn for the kernel that is picked)."""
+    """Slopes lose width · (random deflection of the selected kernel)."""
     place = (step.column + 2 * step.kernel_of(before))[..., None]
     drawn = [np.take_along_axis(before.points, place + n, -1)[..., 0] for n in range(2)]
     stretch = np.ones_like(before.x) if step.width is None else step.width(before.x, before.y)[..., 0]

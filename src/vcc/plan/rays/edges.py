@@ -1,8 +1,8 @@
-"""Hard edges in the path of rays: where what a ray meets jumps, and which of them the rays of a picture run into.
+"""Hard edges in the path of rays: discontinuities that rays meet, and which of them cut the rays of an image.
 
-Rays are drawn at fixed points, so that a picture is a fixed function of a plan's numbers. Where a ray passes an
-edge or not, this function is constant but for jumps: its derivative passes by the edge, and says nothing of the
-light that the edge would let through next. It is the picture's own only where no edge moves against rays.
+Rays are drawn at fixed points, so that an image is a fixed function of a plan's parameters. A ray passes an edge
+or not, so this function is piecewise constant with respect to the edge: its derivative does not include
+the light that the edge would transmit next. It is the image's true derivative only if no edge moves against rays.
 """
 
 from __future__ import annotations
@@ -27,39 +27,39 @@ EDGES: dict[type, tuple[str, ...]] = {
     steps.FacetsUnbend: ("directions", "decentre"),
     steps.Unscatter: ("cumulative",),
 }
-"""Numbers of steps that move nothing but an edge: there is no derivative to them."""
+"""Parameters of steps that move only an edge: there is no derivative to them."""
 BORDERS: dict[type, tuple[str, ...]] = {**EDGES, steps.CellsUnbend: ("lattice", "decentre")}
-"""Numbers of steps that move an edge, whatever else they do."""
+"""Parameters of steps that move an edge, among other effects."""
 MOVING = (steps.Move, steps.CellsUnbend, steps.FacetsUnbend, steps.TextureUnbend, steps.Unscatter)
-"""Steps that move rays; others weigh them."""
+"""Steps that move rays; other steps weight them."""
 PIXELS = 16
-"""Pixels a side of the sensor whose rays tell."""
+"""Pixels a side of the sensor whose rays are tested."""
 RAYS = 32
-"""Rays of each of them."""
+"""Rays of each of these pixels."""
 SHARP = 1 / 64
-"""Share of a pixel over which the rim of a stop is to be seen at least: of 64 rays, evenly spread, one lies there.
-What fewer rays say of it is noise, or nothing."""
+"""Smallest share of a pixel over which the rim of a stop must be visible: one of 64 evenly spread rays lies there.
+With fewer rays, the result is noise or zero."""
 
 
 @dataclass(frozen=True)
 class _Edge:
-    """An edge that rays run into, by the number of its step; that of the views comes after all steps."""
+    """An edge that cuts rays, by the number of its step; the border of the views comes after all steps."""
 
     number: int
     words: str
 
 
 def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: int = PIXELS) -> tuple[str, ...]:
-    """What stands with a hard edge in the way of rays that were aimed, in words.
+    """The hard edges that cut aimed rays, as text.
 
-    Rays of pixels all over the sensor are traced: an edge cuts where some of them pass it and others do not, or
-    where they meet different cells or facets. Cells of an array that are aimed at one by one have no such border.
+    Rays of pixels all over the sensor are traced: an edge cuts if some of them pass it and others do not, or
+    if they meet different cells or facets. Cells of an array with their own windows have no such border.
 
     Args:
-        core: what is traced.
-        changed: names of numbers (`vcc.plan.parameters.numbers` of the core) that change: of the edges those count
-            against which rays then move. None: all edges that cut.
-        pixels: how many a side of the sensor are traced.
+        core: the rays.
+        changed: names of parameters (`vcc.plan.parameters.parameters` of the core) that change: only edges that
+            move against rays then count. None: all edges that cut.
+        pixels: pixels a side of the sensor that are traced.
     """
     found = dict.fromkeys(
         edge.words
@@ -70,11 +70,11 @@ def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: i
 
 
 def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
-    """Refuse numbers that move nothing but a hard edge that cuts rays.
+    """Raise an error for parameters that move only a hard edge that cuts rays.
 
     Args:
-        core: what is traced.
-        wanted: names of numbers to which a derivative is wanted.
+        core: the rays.
+        wanted: names of parameters to differentiate.
 
     Raises:
         InputError: one of them moves such an edge, named.
@@ -91,20 +91,20 @@ def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
 
 
 def _names(name: str, number: int, step: Step, table: dict[type, tuple[str, ...]]) -> bool:
-    """Whether a name is that of one of the numbers that a table lists of a step."""
+    """Whether a name belongs to one of the parameters that a table lists for a step."""
     start = f"steps[{number}]."
     rest = name.removeprefix(start).split(".")[0]
     return name.startswith(start) and rest in table.get(type(step), ())
 
 
 def _moves(core: Rays, edge: _Edge, name: str) -> bool:
-    """Whether a change of a number moves an edge against the rays, or the rays against it."""
+    """Whether a change of a parameter moves an edge against the rays, or the rays against it."""
     n = edge.number
     return _moved_from(core, name) <= n or (n < len(core.steps) and _names(name, n, core.steps[n], BORDERS))
 
 
 def _moved_from(core: Rays, name: str) -> int:
-    """The first step that rays meet elsewhere when a number changes; beyond all where they do not."""
+    """The first step that rays meet at another place when a parameter changes; beyond the last step if none."""
     never = len(core.steps) + 1
     if name in ("scale", "motion"):
         return never
@@ -149,9 +149,9 @@ def _edges(core: Rays, pixels: int) -> list[_Edge]:
 
 
 def _images_its_stop(core: Rays, aim: CellWindows) -> bool:
-    """Whether cells image the rim of their stop on the sensor within so little of a pixel that few rays show it.
+    """Whether cells image the rim of their stop on the sensor too sharply for a few rays to resolve it.
 
-    Seen from places of a pixel, the stop comes into a cell's opening over this share of the pixel's width.
+    Over this share of a pixel's width, the stop enters a cell's opening.
     """
     sight = aim.sight
     gain = np.abs(sight.beyond + aim.cells.powers.reshape(-1, 1) * sight.beyond_from_slope)
@@ -160,7 +160,7 @@ def _images_its_stop(core: Rays, aim: CellWindows) -> bool:
 
 
 def _cut(step: Step, before: Bundle, behind: Bundle, cells: Cell | None) -> str:
-    """The edge of a step that cuts the light that arrives there, in words; empty where none does."""
+    """The edge of a step that cuts the arriving light, as text; empty if none does."""
     lit = before.share > 0
     match step:
         case steps.Disc() | steps.Rectangle() | steps.CellGaps() | steps.BlockOfCells():

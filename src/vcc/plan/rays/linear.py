@@ -1,4 +1,4 @@
-"""Which numbers of a plan by rays are linear in what elements hold, and the transposes of these maps."""
+"""Parameters of a ray plan that are linear in parameters of elements, and the transposes of these maps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vcc.shapes.surface import Surface
 
 
 def by_cells(cells: Cells, step: CellShares) -> Linear:
-    """A mask of cells that rays meet one by one: its values are the cells'."""
+    """A mask of cells that rays meet one by one: the parameters are the cells' values."""
     return Linear(
         lambda thing, field: is_values(thing, field) and thing is cells,
         lambda plan: _of_step(plan, step, "values"),
@@ -25,7 +25,7 @@ def by_cells(cells: Cells, step: CellShares) -> Linear:
 
 
 def by_surface(stage: Stage, step: TextureUnbend) -> Linear:
-    """A plate whose slopes are linear in what its surface holds: heights of a spline, Zernike coefficients."""
+    """A plate whose slopes are linear in a field of its surface: heights of a spline, Zernike coefficients."""
     surface = getattr(stage.faces.bending, "surface", None)
     x, y = (
         start - middle + apart * np.arange(count)
@@ -49,7 +49,7 @@ def by_surface(stage: Stage, step: TextureUnbend) -> Linear:
 
 
 def by_widths(stage: Stage, step: Step, width: Texture) -> Linear:
-    """A diffuser whose kernel is stretched over its surface: the texture is the map of widths itself."""
+    """A diffuser whose kernel is stretched over its surface: the texture is the map of widths."""
     return Linear(
         lambda thing, field: (
             thing is stage.element
@@ -64,5 +64,5 @@ def by_widths(stage: Stage, step: Step, width: Texture) -> Linear:
 
 
 def _of_step(plan: Any, step: Any, name: str) -> tuple[str, ...]:
-    """The full names of a number of a step, where the plan has it."""
+    """The full names of a parameter of a step, if the plan contains the step."""
     return tuple(f"core.steps[{n}].{name}" for n, one in enumerate(plan.core.steps) if one is step)

@@ -84,8 +84,7 @@ class Rays(Value):
         return replace(self, index_from_ray=place @ self.index_from_ray, views=block.shape)
 
     def required(self, wanted: Collection[str]) -> set[str]:
-        """The parameters of a part whose derivatives are needed for the given parameters of this core: the
-        same."""
+        """The parameters of a part whose derivatives are needed for those of this core: the same."""
         return set(wanted)
 
     def full_gradients(self, block: Block, numbers: Mapping[str, Array]) -> dict[str, Array]:
@@ -137,8 +136,7 @@ class Rays(Value):
 
     @property
     def bands(self) -> int:
-        """The number of bands of rows of pixels into which the views may be cut, each read by a part of the
-        rays; 1 if unknown."""
+        """Number of bands of rows of pixels into which views may be cut for parts of the rays; 1 if unknown."""
         if (reach := self.reach) is None:
             return 1
         row = np.array([0, self.raster_shape[0] - 1])

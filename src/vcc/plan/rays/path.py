@@ -23,7 +23,7 @@ STEEPEST = 1.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Leg(Brief):
-    """A stage, the map from behind it to the next stage undone, and the stop in its plane.
+    """A stage, the inverse map from the sensor to just behind it, and the stop in its plane.
 
     Args:
         number: 0 for the stage nearest to the sensor.

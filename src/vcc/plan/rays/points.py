@@ -1,4 +1,4 @@
-"""The points that all pixels share: an evenly spread table of what is drawn for each ray."""
+"""The table of random numbers for rays, evenly spread, which all pixels share."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from vcc.optics.scatter import Scatter
 Array = NDArray[np.float64]
 
 TABLE = 2**16
-"""Points of the sequence that all pixels share; a pixel takes an aligned block of them."""
+"""Points of the sequence that all pixels share; a pixel uses an aligned block of them."""
 SCRAMBLES = 16
-"""Parts of the table that are scrambled each by itself, so that a picture's pixels sample many scramblings."""
+"""Parts of the table with independent scramblings, so that an image's pixels sample many scramblings."""
 FIRST_COLUMNS = 4
 """Columns of the table that every plan has: place in the pixel (x, y), place in the aim (x, y)."""
 BITS = TABLE.bit_length() - 1
-"""Binary digits by which the points of the table differ before they are scrambled."""
+"""Binary digits in which the points of the table differ before they are scrambled."""
 DIRECTIONS = (
     (0, 1), (1, 1, 3), (1, 1, 3, 1), (2, 1, 1, 1), (1, 1, 1, 3, 3), (4, 1, 3, 5, 13), (2, 1, 1, 5, 5, 17),
     (4, 1, 1, 5, 5, 5), (7, 1, 1, 7, 11, 19),
 )  # fmt: skip
-"""Of each dimension after the first: the inner coefficients of its primitive polynomial, and its first direction
+"""For each dimension after the first: the inner coefficients of its primitive polynomial, and its first direction
 numbers, by Joe and Kuo (new-joe-kuo-6.21201)."""
 DIGITS = 24
-"""Binary digits of a point: as many as float32 holds of numbers below 1."""
+"""Binary digits of a point: as many as float32 has for numbers below 1."""
 
 
 def columns_of(scatter: Scatter) -> int:
-    """How many columns of the table of points a scatterer needs."""
+    """Number of columns of the table of points that a scatterer needs."""
     return 2 * len(scatter.kernels) + (scatter.weights is not None)
 
 
@@ -44,7 +44,7 @@ def table(
         seed: of their scrambling.
         scatters: the diffusers, the one nearest to the sensor first.
         disc: whether rays are aimed at a disc.
-        kind: of the numbers of diffusers; a table without any is in single precision.
+        kind: type of the numbers for diffusers; a table without diffusers is in single precision.
     """
     dimensions = FIRST_COLUMNS + sum(2 + (scatter.weights is not None) for scatter in scatters)
     first = _first_columns(dimensions, seed, disc)
@@ -66,7 +66,7 @@ def table(
 
 @lru_cache(maxsize=4)
 def _first_columns(dimensions: int, seed: int, disc: bool) -> NDArray[np.float32]:
-    """Places in the pixel and in the aim, (`TABLE`, `FIRST_COLUMNS`): the same for all cameras, so kept."""
+    """Places in the pixel and in the aim, (`TABLE`, `FIRST_COLUMNS`): cached, since common to all cameras."""
     even = _sobol(dimensions, seed)
     aim = _on_disc(even[:, 2], even[:, 3]) if disc else even[:, 2:4].T
     columns = np.stack([even[:, 0], even[:, 1], *aim], axis=1).astype(np.float32)
@@ -76,13 +76,13 @@ def _first_columns(dimensions: int, seed: int, disc: bool) -> NDArray[np.float32
 
 @lru_cache(maxsize=4)
 def _sobol(dimensions: int, seed: int) -> Array:
-    """`TABLE` points of a scrambled Sobol' sequence: any aligned block of 2ⁿ of a part of them is evenly spread.
+    """`TABLE` points of a scrambled Sobol' sequence; any aligned block of 2ⁿ within a part is evenly spread.
 
-    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped or not by chance, by
-    all digits before it (Owen 1995). A linear scrambling would make all blocks alike but for a shift, and pixels
-    would err alike. So would one scrambling of the whole table: its first digits are common to all blocks, and by
-    one draw of them all pixels' halves differ by more or less than their means err. A picture's estimate of its
-    error was then off by a factor of 1.7 now and then. Each of `SCRAMBLES` parts has a scrambling of its own.
+    (`TABLE`, dimensions) of numbers 0 … 1 of `DIGITS` binary digits. Each digit is flipped at random, depending on
+    all digits before it (Owen 1995). With a linear scrambling, all blocks would be equal up to a shift, and so
+    would the errors of pixels. With one scrambling of the whole table, all blocks share its first digits, and
+    all pixels' halves would differ by more, or by less, than their means err: an image's error estimate was then
+    sometimes wrong by a factor of 1.7. So each of `SCRAMBLES` parts has its own scrambling.
     """
     each = TABLE // SCRAMBLES
     depth = each.bit_length() - 1  # digits in which the points of a part differ
@@ -93,7 +93,7 @@ def _sobol(dimensions: int, seed: int) -> Array:
     for column in range(dimensions):
         for first in range(0, TABLE, each):
             part = slice(first, first + each)
-            scrambled = np.zeros(1, dtype=np.int64)  # of each number of so many digits
+            scrambled = np.zeros(1, dtype=np.int64)  # for each number of this many digits
             for before in range(depth):
                 flips = generator.integers(0, 2, 2**before)
                 scrambled = (2 * scrambled[:, None] + (np.arange(2) ^ flips[:, None])).ravel()
@@ -106,8 +106,8 @@ def _sobol(dimensions: int, seed: int) -> Array:
 def _plain(dimensions: int) -> NDArray[np.int64]:
     """`TABLE` points of the unscrambled sequence in the order of Gray's code, (`TABLE`, dimensions), in 2⁻¹⁶.
 
-    By the direction numbers of Joe and Kuo (2008), as SciPy has them, which takes longer to load than to compute
-    with: it is asked only for more dimensions than stand here.
+    Uses the direction numbers of Joe and Kuo (2008), as SciPy does. SciPy takes longer to load than this
+    computation, and is imported only for more dimensions than are listed here.
     """
     if dimensions > 1 + len(DIRECTIONS):
         from scipy.stats import qmc
@@ -130,7 +130,7 @@ def _plain(dimensions: int) -> NDArray[np.int64]:
 
 
 def _on_disc(xi: Array, eta: Array) -> list[Array]:
-    """Points of the unit square on the unit disc, equal areas to equal areas, neighbours to neighbours.
+    """Map points of the unit square to the unit disc, preserving areas and neighbourhoods.
 
     The concentric map of Shirley and Chiu (1997).
     """
@@ -144,7 +144,7 @@ def _on_disc(xi: Array, eta: Array) -> list[Array]:
 
 
 def hashed(number: NDArray[np.int64], seed: int) -> NDArray[np.uint32]:
-    """A 32-bit hash of whole numbers and a seed (the finaliser of MurmurHash3, by Austin Appleby)."""
+    """A 32-bit hash of integers and a seed (the finaliser of MurmurHash3, by Austin Appleby)."""
     h = (number & 0xFFFFFFFF).astype(np.uint32) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
     h = (h ^ (h >> np.uint32(16))) * np.uint32(0x85EBCA6B)
     h = (h ^ (h >> np.uint32(13))) * np.uint32(0xC2B2AE35)

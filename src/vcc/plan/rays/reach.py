@@ -1,4 +1,4 @@
-"""Which samples rays look at, in closed form: where all that they meet is affine, and x and y do not mix."""
+"""The samples that rays read, in closed form: for affine optics that do not mix x and y."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 MARGIN = 1e-6
-"""Samples by which rays are taken to reach further than they do, which rounding cannot exceed."""
+"""Margin in samples that is added to the reach of rays for rounding errors."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reach(Brief):
-    """How far the rays of pixels reach in a light field. All pairs are along (x, y).
+    """The range of the rays of pixels in a light field. All pairs are along (x, y).
 
     Args:
         index_from_ray: 5×5, indices (i, j, k, l) from rays (x, y, s, t, 1) at the sensor.
-        window: what rays are aimed at.
-        motion: see `vcc.plan.rays.model.Rays`, as all that follow.
+        window: the aim of the rays.
+        motion: see `vcc.plan.rays.model.Rays`, also for the following.
         first_pixel: see there.
         pitch: see there.
         sensitive: see there.
@@ -43,7 +43,7 @@ class Reach(Brief):
     raster_shape: tuple[int, int]
 
     def places(self, axis: int, first: NDArray[np.int64], last: NDArray[np.int64]) -> Array:
-        """The lowest and the highest place that pixels of a first to a last number cover, (numbers, 2)."""
+        """The lowest and the highest place covered by pixels ``first`` to ``last``, (numbers, 2)."""
         places = self.first_pixel[axis] + self.pitch[axis] * np.stack([first, last], axis=-1)
         half = self.sensitive[axis] / 2
         return np.stack([places.min(axis=-1) - half, places.max(axis=-1) + half], axis=-1)
@@ -51,22 +51,23 @@ class Reach(Brief):
     def samples(
         self, axis: int, first: NDArray[np.int64], last: NDArray[np.int64], views: int
     ) -> tuple[Array, Array] | None:
-        """Between which indices k (or l) rays look at views, from pixels of a first to a last number.
+        """The range of indices k (or l) that rays from pixels ``first`` to ``last`` read in views.
 
         Args:
             axis: 0 along x, 1 along y.
             first: (numbers,).
             last: likewise.
-            views: how many there are along the axis.
+            views: number of views along the axis.
 
         Returns:
-            Lowest and highest, (numbers, views) each; None where rays from one place all meet one view.
+            Lowest and highest, (numbers, views) each; None if rays from one place all meet one view.
         """
         view_from_place, view_from_slope, view_offset = self.index_from_ray[axis, [axis, 2 + axis, 4]]
         from_place, from_slope, offset = self.index_from_ray[2 + axis, [axis, 2 + axis, 4]]
         if view_from_slope == 0:
             return None
-        # Rays look at a view that they pass within a view on either side, beyond the outermost by half of one.
+        # Rays read a view that they pass at a distance of less than one view, and half a view beyond the
+        # outermost.
         view = np.arange(views)
         passed = np.clip(np.stack([view - 1.0, view + 1.0]), -0.5, views - 0.5)  # (2, views)
         # At place x and view index i the slope is (i − a·x − c)/b: indices are linear in x and i.
@@ -81,7 +82,7 @@ class Reach(Brief):
         return at.min(axis=1) - MARGIN, at.max(axis=1) + MARGIN
 
     def views(self, axis: int) -> tuple[float, float]:
-        """Between which indices i (or j) all rays pass the views."""
+        """The range of indices i (or j) in which all rays pass the views."""
         across, down = (
             self.places(each, np.array([0]), np.array([self.raster_shape[1 - each] - 1]))[0] for each in (0, 1)
         )
@@ -98,7 +99,7 @@ class Reach(Brief):
 
 
 def index_from_sensor(aim: Aim, steps: Sequence[Step], index_from_ray: Affine, motion: Array) -> Array | None:
-    """Indices from rays at the sensor, 5×5; None where that is no affine map, or x and y mix in it."""
+    """Indices from rays at the sensor, 5×5; None if this is not an affine map, or if x and y mix in it."""
     if not isinstance(aim, Window) or aim.slope_from_scatter or motion[0, 1] or motion[1, 0]:
         return None
     total = Affine.identity()

@@ -348,8 +348,7 @@ class CellShares(Brief):
         rays.share = rays.share * np.where(inside, self.values[row, column], 0.0)
 
     def cell_of(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """(row, column) of the cell at each place, or of the nearest cell at the border, and whether the place
-        is inside."""
+        """(row, column) of the cell at or nearest to each place, and whether the place is inside the mask."""
         rows, columns = self.values.shape
         column = np.floor((x - self.corner[0]) / self.size[0]).astype(np.int64)
         row = np.floor((y - self.corner[1]) / self.size[1]).astype(np.int64)

@@ -1,8 +1,8 @@
-"""Functions of position as textures, as coarse as a picture allows.
+"""Functions of position as textures, as coarse as the accuracy of the image allows.
 
-What a ray meets is looked up linearly between the points of a texture. Bends are sampled where points are, and may
-err by what moves rays by a thousandth of a sample. Masks are averaged around each point, so that no light is lost
-between points, and may be as coarse as what a pixel's rays spread over allows.
+Elements are looked up linearly between the points of a texture. Deflections are sampled at the points; their error
+may move rays by a thousandth of a sample. Masks are averaged around each point, so that no light is lost
+between points; their spacing may be as coarse as the area over which a pixel's rays spread allows.
 """
 
 from __future__ import annotations
@@ -24,34 +24,35 @@ Array = NDArray[np.float64]
 SIZES = (513, 1025, 2049)
 """Points a side of textures, tried until they are fine enough."""
 COARSE_SIZES = (257, *SIZES)
-"""The same where coarse ones may do."""
+"""The same if coarse textures may be sufficient."""
 FINE_ENOUGH = 1e-6
 """Error of a texture between its points, root mean square as a share of the largest value."""
 SHIFT_ENOUGH = 1e-3
-"""The same of a texture of slopes, in samples of the light field by which rays then miss their place."""
+"""Error of a texture of slopes, in samples of the light field by which rays then miss their place."""
 POINTS_PER_FOOTPRINT = 32
-"""Points of a mask's texture across what one pixel's rays spread over. A box that wide is then blurred by a tent
-and a box of 1/32 of it, a standard deviation of 1/64: at both ends of the ramp that it makes of an edge, over an
-eighth of it, the picture is off by up to 0.4/64 of the edge, 0.6 %; no light is lost."""
+"""Points of a mask's texture across the area over which one pixel's rays spread. A box of this width is then
+blurred by a tent and a box of 1/32 of it, a standard deviation of 1/64. At both ends of the ramp that the box
+makes of an edge, over an eighth of it, the image is wrong by up to 0.4/64 of the edge, 0.6 %; no light is
+lost."""
 WORTH_SAYING = 1e-3
-"""Error of a texture, as `FINE_ENOUGH`, from which on a plan says it."""
+"""Error of a texture, as `FINE_ENOUGH`, above which a plan reports it."""
 POINTS_AT_ONCE = 2**17
 ROOM = 0.1
-"""By how much of a region a texture that is kept reaches beyond it on each side, within what passes."""
+"""Margin of a kept texture on each side, as a share of the region, within the opening."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sampled(Brief):
-    """What is sampled of an element.
+    """A function of position to sample, of an element.
 
     Args:
-        values: the numbers that points of a texture hold, a function of (x, y, spacing), places (1, columns) and
+        values: the values at points of a texture, a function of (x, y, spacing), places (1, columns) and
             (rows, 1) in metres from the element's middle.
         middle: place (x, y) of the element, metres.
         region: lowest and highest (x, y) at which rays meet it, metres.
-        passes: the same of what passes in its plane; infinite where nothing bounds it.
-        of: what the values are of; equal things have equal values.
-        itself: the function of (x, y) that a texture stands for, where that is not ``values``.
+        passes: lowest and highest (x, y) of the opening in its plane; infinite if nothing bounds it.
+        of: the object that the values belong to; equal objects have equal values.
+        itself: the function of (x, y) that the texture approximates, if different from ``values``.
     """
 
     values: Callable[[Array, Array, tuple[float, float]], Array]
@@ -62,12 +63,12 @@ class Sampled(Brief):
     itself: Callable[[Array, Array], Array] | None = None
 
     def from_middle(self) -> tuple[Array, Array]:
-        """The region, counted from the element's middle."""
+        """The region, relative to the element's middle."""
         low, high = self.region
         return low - self.middle, high - self.middle
 
     def with_room(self) -> Sampled:
-        """The same with room around the region."""
+        """The same with a margin around the region."""
         (low, high), (lowest, highest) = self.region, self.passes
         room = ROOM * (high - low)
         region = (
@@ -79,12 +80,12 @@ class Sampled(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Enough(Brief):
-    """What is fine enough of a texture, beside its own error.
+    """Criteria for a fine enough texture, in addition to its own error.
 
     Args:
-        spacing: distance (x, y) of points that is whatever the error, metres; None: none is.
-        index_from_value: (4, numbers), by how many samples of the light field rays move for an error of the
-            numbers; None where that is not known, and the error counts alone.
+        spacing: distance (x, y) of points that is sufficient for any error, metres; None: none is.
+        index_from_value: (4, numbers), samples of the light field by which rays move for an error of the
+            values; None if unknown, and only the error counts.
     """
 
     spacing: Array | None = None
@@ -92,12 +93,12 @@ class Enough(Brief):
 
 
 EXACT = Enough()
-"""Nothing but that a texture errs little."""
+"""Only the error of the texture counts."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Points(Brief):
-    """Where the points of a texture stand on its element.
+    """Places of the points of a texture on its element.
 
     Args:
         size: points a side.
@@ -112,22 +113,22 @@ class Points(Brief):
     error: float
 
     def holds(self, low: Array, high: Array) -> bool:
-        """Whether a region lies within them, but for one spacing, over which the outermost values are held."""
+        """Whether a region lies within the points, or at most one spacing outside, with constant values."""
         last = np.array(self.start) + np.array(self.spacing) * self.size
         return bool((low >= np.array(self.start) - self.spacing).all() and (high <= last).all())
 
     def like(self, other: Points) -> bool:
-        """Whether they are as many and almost as close."""
+        """Whether they are equally many, with similar spacing."""
         return self.size == other.size and np.allclose(self.spacing, other.spacing, rtol=0.5, atol=0)
 
 
 def choose_points(sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> Points:
-    """The points of a texture that follows a camera: on the element, with room around the region.
+    """Choose the points of a texture that follows a camera: fixed on the element, with a margin around the region.
 
     Args:
-        sampled: what is sampled.
+        sampled: the function.
         sizes: see `made_fine_enough`.
-        enough: likewise.
+        enough: see `made_fine_enough`.
     """
     texture, error = made_fine_enough(sampled.with_room(), sizes, enough)
     x, y = (start - middle for start, middle in zip(texture.start, sampled.middle, strict=True))
@@ -135,12 +136,12 @@ def choose_points(sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> P
 
 
 def at_points(sampled: Sampled, points: Points, parts: Parts) -> Texture:
-    """The texture whose points were chosen.
+    """The texture at the chosen points.
 
     Args:
-        sampled: what is sampled.
+        sampled: the function.
         points: on the element.
-        parts: what is kept of plans nearby.
+        parts: cached parts of nearby plans.
 
     Raises:
         InputError: a region beyond the points.
@@ -157,13 +158,13 @@ def at_points(sampled: Sampled, points: Points, parts: Parts) -> Texture:
 
 
 def made_fine_enough(sampled: Sampled, sizes: tuple[int, ...], enough: Enough = EXACT) -> tuple[Texture, float]:
-    """The coarsest texture that is fine enough for a function over a region, and its error anywhere.
+    """The coarsest texture that is fine enough for a function over a region, and its error.
 
     Args:
-        sampled: what is sampled, and where.
-        sizes: points a side. After the first, the first one is tried that should do: interpolation errs as the
-            square of the spacing. The last one is taken if none should.
-        enough: what is fine enough.
+        sampled: the function and its region.
+        sizes: points a side. After the first, the next one is the first that is expected to be sufficient: the
+            interpolation error grows as the square of the spacing. The last one is used if none is.
+        enough: the criteria.
 
     Returns:
         The texture, and its root mean square error as a share of its largest value.
@@ -209,7 +210,7 @@ def _values(
     size: int,
     middle: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """What the points of a texture hold, (size, size, numbers); ``start`` counted from where ``middle`` is."""
+    """Values at the points of a texture, (size, size, numbers); ``start`` has the same origin as ``middle``."""
     column, row = start[0] + spacing[0] * np.arange(size), start[1] + spacing[1] * np.arange(size)
     across = np.asarray(column[None, :] - middle[0], dtype=np.float64)
     parts: list[Array] = np.array_split(row, -(-size * size // POINTS_AT_ONCE))
@@ -224,12 +225,12 @@ def _values(
 
 
 def means_around(pattern: Pattern, x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-    """A pattern's mean over the cell around each point of a lattice: in closed form where it has one.
+    """A pattern's mean over the cell around each point of a lattice, in closed form if it has one.
 
-    Else over 4×4 places in each cell, 2×2 on the finest lattices.
+    Else the mean of 4×4 places in each cell, 2×2 on the finest lattices.
 
     Args:
-        pattern: what is averaged.
+        pattern: to average.
         x: places of the columns, (1, columns), metres from the pattern's middle.
         y: places of the rows, (rows, 1).
         spacing: of the lattice, (x, y).

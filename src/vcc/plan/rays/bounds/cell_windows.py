@@ -1,4 +1,4 @@
-"""Windows in the cells of a lens array: of each cell, what light comes through from the bound beyond it."""
+"""Windows in the cells of a lens array: the part of each cell that transmits light from the bound beyond it."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from vcc.shapes.patterns import Bounded, Pattern
 Array = NDArray[np.float64]
 
 MOST_CELLS = 81
-"""Cells of a lens array that are looked at for one pixel; with more, rays are aimed at the array as a whole."""
+"""Cells of a lens array that are used for one pixel; with more, rays are aimed at the array as a whole."""
 ROUNDING = 1e-6
-"""In cells: how far a place may seem from where it is."""
+"""Rounding error of a place, in cells."""
 PLACES, POINTS = 12, 12
-"""Places a side of the sensor, and points across a cell, from which areas of windows are told."""
+"""Places a side of the sensor, and points across a cell, for computing areas of windows."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What light comes to a place on the sensor through cells' windows, the mean over some places.
+    """Light that reaches a place on the sensor through cells' windows, the mean over some places.
 
     Args:
         solid_angle: ∫∫ ds dt through all windows.
-        cells: how many there are.
+        cells: number of cells with light.
     """
 
     solid_angle: float
@@ -42,13 +42,13 @@ class Seen:
 
 
 def cell_windows(path: Path, deflections: list[Array], everything: bool) -> tuple[CellWindows, Seen] | None:
-    """The cells of the array nearest to the sensor, where something beyond it bounds what they see.
+    """The windows of the array nearest to the sensor, if a bound beyond it limits the view through its cells.
 
-    And what comes through them.
+    The second value describes the light that they transmit.
 
     Args:
         path: from the sensor.
-        deflections: how far rays can stray, by all that bends or scatters.
+        deflections: deviations of rays, by all deflections and scattering.
         everything: see `vcc.plan.rays.bounds.slopes.bounds`.
     """
     leg = _array(path)
@@ -62,14 +62,14 @@ def cell_windows(path: Path, deflections: list[Array], everything: bool) -> tupl
 def cell_windows_towards(
     path: Path, deflections: list[Array], everything: bool, number: int, words: str
 ) -> CellWindows | None:
-    """The same towards one bound, whatever they are now.
+    """The current windows of the cells towards one bound.
 
     Args:
         path: from the sensor.
         deflections: see `cell_windows`.
         everything: likewise.
         number: of the bound's leg.
-        words: of the bound, where the light field has two.
+        words: of the bound, if the light field has two.
     """
     leg = _array(path)
     if leg is None:
@@ -83,13 +83,13 @@ def cell_windows_towards(
 
 
 def _beyond(path: Path, leg: Leg, deflections: list[Array], everything: bool) -> list[Bound]:
-    """What bounds rays beyond an array, along both axes."""
+    """The bounds of rays beyond an array, along both axes."""
     found = [bound for bound in bounds(path, deflections, everything) if bound.number > leg.number]
     return [bound for bound in found if np.isfinite(bound.half).all()]
 
 
 def _array(path: Path) -> Leg | None:
-    """The array nearest to the sensor, if nothing between bends or scatters light or mixes x and y."""
+    """The array nearest to the sensor, if nothing in between bends or scatters light or mixes x and y."""
     for leg in path.legs:
         faces = leg.stage.faces
         if faces.bending is None and faces.spread is None:
@@ -100,7 +100,7 @@ def _array(path: Path) -> Leg | None:
 
 
 def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]:
-    """The windows towards each bound beyond an array that are a help."""
+    """The windows towards each bound beyond an array, if there are few enough cells."""
     bending, element = leg.stage.faces.bending, leg.stage.element
     assert isinstance(bending, CellDeflection)
     cells = replace(bending, lattice=_moved(bending.lattice, element.decentre))
@@ -111,7 +111,7 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
         sight = None if mixes_axes(way) else _sight(leg.from_sensor, way, bound.axes)
         if sight is None:
             continue
-        # By how much the array itself bends its windows know exactly.
+        # The windows take the array's own deflection into account exactly.
         own = np.abs(way.linear[bound.axes, 2:]) @ np.array(bending.largest(0.0, 0.0))
         stop = Stop(bound.middle, *bound.widened(own))
         reach = _reach(cells, opening, sight, stop, path.pixel)
@@ -121,12 +121,12 @@ def _towards(path: Path, leg: Leg, beyond: list[Bound]) -> Iterator[CellWindows]
 
 
 def _moved(lattice: Lattice, decentre: tuple[float, float]) -> Lattice:
-    """The lattice with its offset counted from the axis of the camera."""
+    """The lattice with its offset relative to the axis of the camera."""
     return replace(lattice, offset=(lattice.offset[0] + decentre[0], lattice.offset[1] + decentre[1]))
 
 
 def _opening(pattern: Pattern | None, lattice: Lattice) -> CellOpening:
-    """What of a lattice's cells is open: whole cells, where nothing stands before them."""
+    """The opening of a lattice's cells: whole cells if there is no mask in front of them."""
     apertures = _apertures(pattern, lattice)
     radius = apertures.scale * lattice.pitch / 2 if apertures.circular else math.inf
     half = np.array(lattice.reach) * (1 if apertures.circular else apertures.scale)
@@ -154,16 +154,16 @@ def _borders(apertures: CellApertures) -> Array:
 
 
 def _sight(here: Affine, way: Affine, axes: slice) -> Sight | None:
-    """How a bound beyond an array is seen from the sensor; None where each cell sees it alike.
+    """The relation between sensor, array and a bound beyond it; None if each cell sees the bound alike.
 
-    With p = A·a + B·σ' at the bound, a being the place on the array and σ' the slope before it: behind it, a ray
-    from x with slope σ has one that is linear in x and σ, so in x and a. Optics may stand between the array and
-    the sensor.
+    At the bound, p = A·a + B·σ', with a the place on the array and σ' the slope before it: behind it, a ray
+    from x with slope σ has a slope that is linear in x and σ, and hence in x and a. There may be optics between
+    the array and the sensor.
 
     Args:
         here: rays just behind the array from rays on the sensor; x and y do not mix.
         way: the coordinates of the bound's plane from rays before the array, likewise.
-        axes: which of these coordinates the bound is of.
+        axes: the two of these coordinates that are bounded.
     """
     xy = np.arange(2)
     from_sensor, from_slope, offset = here.linear[xy, xy], here.linear[xy, xy + 2], here.offset[:2]
@@ -186,7 +186,7 @@ def _sight(here: Affine, way: Affine, axes: slice) -> Sight | None:
 
 
 def _reach(cells: CellDeflection, opening: CellOpening, sight: Sight, stop: Stop, pixel: Array) -> tuple[int, int]:
-    """(rows, columns) of cells on each side of the nearest one through which light of the stop can come.
+    """(rows, columns) of cells on each side of the nearest one through which light of the stop can arrive.
 
     Those with |p(centre)| ≤ half + |gain of the cell|·cell + |prism|, from all over a pixel of this size (x, y).
     """
@@ -197,8 +197,8 @@ def _reach(cells: CellDeflection, opening: CellOpening, sight: Sight, stop: Stop
     distance = (stop.half + gain * opening.half + prism + across_pixel) / np.abs(sight.beyond)
     cosine, sine = abs(math.cos(lattice.rotation)), abs(math.sin(lattice.rotation))
     along, up = np.array([[cosine, sine], [sine, cosine]]) @ distance  # along the lattice's own axes
-    # The place looked from is up to half a cell off the centre of the nearest one; hexagonal cells are 4/3 of a
-    # row high, and every second row is half a cell to the side.
+    # A place is up to half a cell off the centre of the nearest cell; hexagonal cells are 4/3 of a
+    # row high, and every second row is shifted by half a cell.
     columns_off, rows_off = (0.5, 0.5) if lattice.layout == "square" else (1.0, 2 / 3)
     return (
         math.floor(up / lattice.row_height + rows_off + ROUNDING),
@@ -207,7 +207,7 @@ def _reach(cells: CellDeflection, opening: CellOpening, sight: Sight, stop: Stop
 
 
 def seen(windows: CellWindows, sensor: Sensor) -> Seen:
-    """What is seen through cells' windows."""
+    """Light seen through cells' windows."""
     areas = _areas(windows, sensor)
     solid_angle = areas.sum(axis=1).mean() / abs(np.prod(windows.sight.place_from_slope))
     return Seen(float(solid_angle), float((areas > 0).sum(axis=1).mean()))
@@ -222,7 +222,7 @@ def _areas(windows: CellWindows, sensor: Sensor) -> Array:
     row, column = windows.around(x[:, 0], y[:, 0])
     points = np.stack([(np.arange(POINTS) + 0.5) / (POINTS / 2) - 1, np.zeros(POINTS)], axis=-1)
     areas = np.zeros(row.shape)
-    meets = windows.meets(x, y, row, column)  # a fifth of them, as a rule
+    meets = windows.meets(x, y, row, column)  # usually a fifth of them
     here = np.nonzero(meets)[0]
     _, _, area = windows.aimed(x[here], y[here], row[meets][:, None], column[meets][:, None], points)
     areas[meets] = area.mean(axis=1)

@@ -1,7 +1,7 @@
-"""How far rays that are aimed can stray from where affine optics lead them, and so where they meet each stage.
+"""The deviation of aimed rays from affine optics, and the regions in which they meet each stage.
 
-Elements that are not affine bend or scatter rays by at most so much: what comes before the sensor is met within a
-region that grows with all that lies behind it.
+Elements that are not affine deflect or scatter rays by limited amounts: the region in which rays meet an element
+grows with all such elements between it and the sensor.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ Slopes = tuple[float, float] | None
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DeflectionBounds(Brief):
-    """How far rays can stray from where affine optics lead them, just behind each stage and at the entrance.
+    """The largest deviations of rays from affine optics, just behind each stage and at the entrance.
 
-    As `RayExtent.loose` has it: columns whose sum, each taken −1 to 1 times, is how a ray strays in (x, y, s, t).
+    As in `RayExtent.loose`: columns whose sum, with factors from −1 to 1, is a ray's deviation in (x, y, s, t).
 
     Args:
-        whole: by all that bends or scatters.
-        unknown: by what the aim cannot make up for: what varies over a surface.
+        whole: by all deflections and scattering.
+        unknown: by those that the aim cannot compensate: the ones that vary over a surface.
     """
 
     whole: list[Array]
@@ -37,17 +37,17 @@ class DeflectionBounds(Brief):
 
     @classmethod
     def none(cls, path: Path) -> DeflectionBounds:
-        """Rays that go where affine optics lead them."""
+        """Rays without deviations from affine optics."""
         still = [np.zeros((4, 0))] * (len(path.legs) + 1)
         return cls(still, still)
 
     @property
     def size(self) -> float:
-        """All of it in one number, metres and slopes summed: to see it settle or run away."""
+        """Sum of all deviations, metres and slopes together, to test for convergence."""
         return sum(float(np.abs(part).sum()) for part in self.whole)
 
     def same(self, other: DeflectionBounds) -> bool:
-        """Whether all of it is what the other's is, to the last digit."""
+        """Whether both are equal, to the last digit."""
         mine, others = (*self.whole, *self.unknown), (*other.whole, *other.unknown)
         return all(np.array_equal(one, another) for one, another in zip(mine, others, strict=True))
 
@@ -55,13 +55,13 @@ class DeflectionBounds(Brief):
 def regions_and_deflections(
     path: Path, aim: Aim, bends: Sequence[Slopes] | None = None
 ) -> tuple[list[tuple[Array, Array]], DeflectionBounds]:
-    """Where rays that are aimed so meet each leg's stage, (low, high) in metres, and how far they can stray.
+    """The regions in which aimed rays meet each leg's stage, (low, high) in metres, and their largest deviations.
 
     Args:
         path: from the sensor.
-        aim: where rays are aimed.
-        bends: by how much each leg's stage changes slopes at most; None, for all or for one: as it
-            does where it is met.
+        aim: of the rays.
+        bends: largest change of slopes by each leg's stage; None, for all or for one: its largest deflection in
+            the region where rays meet it.
     """
     extent = extent_towards(path, aim)
     unknown = replace(extent, loose=np.zeros((4, 0)))
@@ -83,16 +83,16 @@ def regions_and_deflections(
 
 
 def _met(extent: RayExtent, leg: Leg) -> tuple[Array, Array]:
-    """Where rays of an extent meet a leg's stage: within its stop, other light being lost."""
+    """The region in which rays of an extent meet a leg's stage: within its stop, since other light is lost."""
     low = np.maximum(extent.middle[:2] - extent.half[:2], leg.stop[0])
     high = np.minimum(extent.middle[:2] + extent.half[:2], leg.stop[1])
     return low, np.maximum(high, low)
 
 
 def largest_bend(leg: Leg, region: tuple[Array, Array]) -> Slopes:
-    """By how much (|δs|, |δt|) a leg's stage bends rays at most that meet it in a region; None where it does not.
+    """The largest deflection (|δs|, |δt|) by a leg's stage in a region; None if it does not deflect rays.
 
-    What varies over the surface cannot be made up for by the aim.
+    The aim cannot compensate deflections that vary over the surface.
     """
     bending, middle = leg.stage.faces.bending, leg.stage.element.decentre
     if bending is None:
@@ -103,7 +103,7 @@ def largest_bend(leg: Leg, region: tuple[Array, Array]) -> Slopes:
 
 
 def _scattered(extent: RayExtent, unknown: RayExtent, leg: Leg) -> tuple[RayExtent, RayExtent]:
-    """The extent before a diffuser. What a uniform one does is drawn beforehand, and the aim makes up for it."""
+    """The extent before a diffuser. The aim compensates deflections by a uniform one, drawn beforehand."""
     spread = leg.stage.faces.spread
     if spread is None:
         return extent, unknown

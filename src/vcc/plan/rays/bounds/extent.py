@@ -1,4 +1,4 @@
-"""Bounds of the places and slopes of all rays that an aim asks for, on their way back from the sensor."""
+"""Bounds of the places and slopes of all rays of an aim, on their way back from the sensor."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RayExtent(Brief):
-    """All rays that are traced, in one plane: (x, y, s, t) = middle + basis · ξ + loose · η, all |ξ|, |η| ≤ 1.
+    """All traced rays, in one plane: (x, y, s, t) = middle + basis · ξ + loose · η, all |ξ|, |η| ≤ 1.
 
-    The four ξ are the places on the sensor and in the window aimed at; each η is what an array, a plate or a
-    diffuser can add at most to s or to t. Affine optics act on both exactly. So the bounds hold, and are tight
-    where all is affine.
+    The four ξ are the places on the sensor and in the window; each η is the largest deflection in s or t by an
+    array, a plate or a diffuser. Affine optics act on both exactly. So the bounds are valid, and are tight
+    if all optics are affine.
 
     Args:
         middle: (4,).
@@ -60,7 +60,7 @@ class RayExtent(Brief):
         return RayExtent(linear @ self.middle + offset, linear @ self.basis, linear @ self.loose)
 
     def loosened(self, slopes: tuple[float, float]) -> RayExtent:
-        """The rays after something that changes slopes by up to (|δs|, |δt|)."""
+        """The rays after an element that changes slopes by up to (|δs|, |δt|)."""
         added = np.zeros((4, 2))
         added[2, 0], added[3, 1] = slopes
         return RayExtent(self.middle, self.basis, np.concatenate([self.loose, added], axis=1))
@@ -72,7 +72,7 @@ class RayExtent(Brief):
 
 
 def extent_towards(path: Path, aim: Aim, half: Array | None = None) -> RayExtent:
-    """All rays that an aim asks for, at the sensor; from all of it, or a rectangle of half sizes (x, y)."""
+    """All rays of an aim, at the sensor; from the whole sensor, or a rectangle of half sizes (x, y)."""
     sensor = path.train.sensor
     middle = np.array(sensor.decentre)
     half = np.array(sensor.size[::-1]) / 2 if half is None else half
@@ -81,7 +81,7 @@ def extent_towards(path: Path, aim: Aim, half: Array | None = None) -> RayExtent
     slopes = np.column_stack([aim.slope_from_point, aim.offset])
     extent = RayExtent.between(middle, half, slopes, aim.slope_from_sensor)
     uniform = [scatter for scatter in path.scatters if scatter.uniform]
-    # Those beyond the window are not made up for: there are as many terms as diffusers before it.
+    # Diffusers beyond the window are not compensated: there are as many terms as diffusers before it.
     for scatter, (_, slope_from_scatter) in zip(uniform, aim.slope_from_scatter, strict=False):
         s, t = np.abs(slope_from_scatter) @ np.array(scatter.reach)
         extent = extent.loosened((float(s), float(t)))
@@ -89,7 +89,7 @@ def extent_towards(path: Path, aim: Aim, half: Array | None = None) -> RayExtent
 
 
 def _through_cells(aim: CellWindows, middle: Array, half: Array) -> RayExtent:
-    """Rays through all the cells that are looked at: those around (stop − offset − factor·x) / beyond."""
+    """Rays through all cells that are used: those around (stop − offset − factor·x) / beyond."""
     sight = aim.sight
     pitch = np.full(2, aim.cells.lattice.pitch)
     reach = np.array(aim.reach[::-1]) * pitch * math.sqrt(2) + 2 * pitch
@@ -103,7 +103,7 @@ def _through_cells(aim: CellWindows, middle: Array, half: Array) -> RayExtent:
 def footprint(path: Path, aim: Aim, leg: Leg) -> Array | None:
     """(width, height) in metres over which the rays of one pixel spread on a leg, by pixel or by window.
 
-    None where that is not known: where something on the way bends otherwise than lenses and prisms do.
+    None if unknown: if an element on the way, other than lenses and prisms, bends rays.
     """
     nearer = path.legs[: leg.number]
     if isinstance(aim, CellWindows) or any(other.stage.faces.bending is not None for other in nearer):

@@ -1,8 +1,8 @@
-"""What rays must pass, as strips of slopes, and the windows that two strips cut out.
+"""Bounds of rays as strips of slopes, and the windows that two strips cut out.
 
-What rays must pass (a stop, a cell of a view, a pixel of a view's picture) bounds one coordinate of a plane, which
+A bound (a stop, a cell of a view, a pixel of a view's image) limits one coordinate of a plane, which
 is affine in a ray's place and slopes at the sensor: a strip of slopes. Two strips that are not parallel make a
-parallelogram. Elements that are not affine widen the strips beyond them by as much as they can bend.
+parallelogram. Elements that are not affine widen the strips beyond them by their largest deflection.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ Array = NDArray[np.float64]
 Pair = tuple[int, int]
 
 GRID_OF_VIEWS, PICTURES = "the grid of views", "the views' pictures"
-"""What the light field bounds rays by: its indices (i, j), and (k, l)."""
+"""Bounds of rays by the light field: by its indices (i, j), and (k, l)."""
 UNBOUNDED = 1e6
-"""Metres, or slopes, by which no ray of a camera strays."""
+"""Metres, or slopes, larger than the deviation of any ray of a camera."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bound(Brief):
-    """What rays must pass in one plane: |two coordinates − middle| ≤ half, and by how much more they can stray.
+    """A bound of rays in one plane: |two coordinates − middle| ≤ half, plus the deviation of rays.
 
     Args:
         number: of the leg, or one more than the last for the light field.
-        from_sensor: the plane's coordinates, of which these are two, from rays on the sensor, through affine
+        from_sensor: the plane's coordinates, including these two, from rays on the sensor, through affine
             optics.
-        axes: which two.
-        middle: of what passes.
-        half: half the size of what passes.
-        loose: by how much rays can stray there from where affine optics lead.
+        axes: numbers of the two coordinates.
+        middle: of the opening.
+        half: half the size of the opening.
+        loose: largest deviation of rays from affine optics there.
         circle: whether it is a round hole.
-        words: what it is.
-        round: whether a round hole is taken for round when it is widened; None: where it is smaller so.
+        words: its name.
+        round: whether a round hole stays round when it is widened; None: if that is smaller.
     """
 
     number: int
@@ -57,13 +57,13 @@ class Bound(Brief):
     round: bool | None = None
 
     def widened(self, known: Array | float = 0.0) -> tuple[Array, bool]:
-        """Half the size by which rays are bound, straying included, and whether that is a disc.
+        """Half the size of the bound, including the deviation of rays, and whether it is a disc.
 
-        A round hole widened is round where that is smaller than the rectangle around it: rays stray in any
-        direction.
+        A widened round hole stays round if that is smaller than the rectangle around it, because rays deviate in
+        any direction.
 
         Args:
-            known: the part of how rays stray that is known, and need not be added.
+            known: the part of the deviation that is known, and need not be added.
         """
         loose = self.loose - known
         if self.circle:
@@ -74,7 +74,7 @@ class Bound(Brief):
         return self.half + loose, False
 
     def slope_bounds(self) -> list[SlopeBound]:
-        """One for each coordinate that is bounded."""
+        """One for each bounded coordinate."""
         half, disc = self.widened()
         coordinates = self.from_sensor.linear[self.axes]
         middle = self.middle - self.from_sensor.offset[self.axes]
@@ -91,11 +91,11 @@ class SlopeBound(Brief):
 
     Args:
         from_sensor: (4,), the coordinate from rays on the sensor, through affine optics.
-        middle: of what passes.
-        half: half the width of what passes, and by how much rays can stray there from where affine optics lead.
+        middle: of the opening.
+        half: half the width of the opening, plus the largest deviation of rays from affine optics.
         number: of the leg, or one more than the last for the light field.
-        disc: whether it is one axis of a round hole, and of what it becomes widened.
-        words: what it is.
+        disc: whether it is one axis of a round hole, or of the disc that it becomes when widened.
+        words: its name.
     """
 
     from_sensor: Array
@@ -107,19 +107,19 @@ class SlopeBound(Brief):
 
     @property
     def bounds_slopes(self) -> bool:
-        """Whether a ray that keeps to it has a slope that is bounded at all."""
+        """Whether it bounds the slope of a ray at all."""
         return bool(self.half < UNBOUNDED * np.linalg.norm(self.from_sensor[2:]))
 
 
 def bounds(path: Path, deflections: list[Array], everything: bool) -> list[Bound]:
-    """What bounds the rays that a camera asks for, or all that bounds those that the light field holds.
+    """The bounds of the rays that a camera requests, or all bounds of the rays that the light field contains.
 
-    A camera asks for what its stops let through, and the grid of views where no stop bounds the light.
+    A camera requests the light that its stops transmit, within the grid of views if no stop bounds the light.
 
     Args:
         path: from the sensor.
-        deflections: how far rays can stray, see `vcc.plan.rays.bounds.deflections.DeflectionBounds`.
-        everything: the views' pictures too, and the grid of views anyway.
+        deflections: deviations of rays, see `vcc.plan.rays.bounds.deflections.DeflectionBounds`.
+        everything: include the views' images, and the grid of views in any case.
     """
     found = [_stop(path, leg, deflections[leg.number]) for leg in path.legs]
     if everything or not path.stops_bound:
@@ -130,12 +130,12 @@ def bounds(path: Path, deflections: list[Array], everything: bool) -> list[Bound
 
 
 def pictures(path: Path, deflections: list[Array]) -> Bound:
-    """The views' pictures."""
+    """The bound by the views' images."""
     return _of_light_field(path, deflections, slice(2, 4), PICTURES)
 
 
 def is_round(leg: Leg) -> bool:
-    """Whether what passes in a leg's plane is a round hole."""
+    """Whether the opening in a leg's plane is a round hole."""
     pattern, (low, high) = leg.stage.faces.pattern, leg.stop
     return isinstance(pattern, Circle) and np.allclose((high - low) / 2, pattern.diameter / 2, rtol=1e-12, atol=0)
 
@@ -147,7 +147,7 @@ def _stop(path: Path, leg: Leg, deflections: Array) -> Bound:
         number=leg.number,
         from_sensor=leg.from_sensor,
         axes=slice(0, 2),
-        middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # of no meaning where unbounded
+        middle=np.add(low, high, out=np.zeros(2), where=np.isfinite(half)) / 2,  # meaningless if unbounded
         half=half,
         loose=np.abs(deflections[:2]).sum(axis=1),
         circle=is_round(leg),
@@ -173,25 +173,25 @@ def _of_light_field(path: Path, deflections: list[Array], axes: slice, words: st
 def windows(path: Path, deflections: list[Array], everything: bool) -> list[Window]:
     """The parallelograms, and discs, of slopes that pairs of strips cut out.
 
-    Where the sensor shows each view as a point, what a camera asks for has no bound but the views' pictures.
+    If the sensor shows each view as a point, the only bound of a camera's request is the views' images.
 
     Args:
         path: from the sensor.
-        deflections: how far rays can stray, but for what windows make up for.
+        deflections: deviations of rays, without those that windows compensate.
         everything: see `bounds`.
     """
     return [window for _, window in windows_by_strips(path, deflections, everything)]
 
 
 def windows_by_strips(path: Path, deflections: list[Array], everything: bool) -> list[tuple[Pair, Window]]:
-    """The same, each with the numbers of the two strips that cut it out, of those that `window_of` knows."""
+    """The same, each with the numbers of its two strips, for `window_of`."""
     strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.slope_bounds()]
     found = list(_cut_out(path, strips))
     return found or list(_cut_out(path, [*strips, *pictures(path, deflections).slope_bounds()]))
 
 
 def window_of(path: Path, deflections: list[Array], everything: bool, pair: Pair) -> Window:
-    """The window that two strips cut out, whatever it is now, by the numbers that `windows_by_strips` gave."""
+    """The current window of two strips, by the numbers that `windows_by_strips` returned."""
     strips = [strip for bound in bounds(path, deflections, everything) for strip in bound.slope_bounds()]
     strips += pictures(path, deflections).slope_bounds() if max(pair) >= len(strips) else []
     return _window(path, (strips[pair[0]], strips[pair[1]]))
@@ -223,7 +223,7 @@ def _window(path: Path, pair: tuple[SlopeBound, SlopeBound]) -> Window:
 
 
 def _made_up(path: Path, pair: tuple[SlopeBound, ...], slope_from_place: Array) -> Iterator[tuple[int, Array]]:
-    """How slopes make up for the uniform diffusers before the planes of the strips; see `Window`."""
+    """Compensation of slopes for the uniform diffusers before the planes of the strips; see `Window`."""
     for leg in path.legs[: max(strip.number for strip in pair)]:
         spread = leg.stage.faces.spread
         if spread is not None and spread.uniform:

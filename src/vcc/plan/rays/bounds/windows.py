@@ -1,4 +1,4 @@
-"""Where rays are aimed, as numbers: a window of slopes, or one in each cell of a lens array."""
+"""Aims of rays, as numbers: a window of slopes, or a window in each cell of a lens array."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from vcc.optics.deflections import CellDeflection
 Array = NDArray[np.float64]
 
 SMALLEST_GAIN = 1e-12
-"""Gains of cells are kept from 0, where a whole cell looks at one place: its bounds are then far outside."""
+"""Smallest gain of a cell: near 0, a whole cell sees one place, and its bounds are then far outside."""
 MARGIN = 1 + 1e-6
-"""By how much more than they reach images and openings are taken to meet, which rounding cannot exceed."""
+"""Factor by which images and openings are enlarged in tests of their intersection, for rounding errors."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Window(Brief):
-    """Where to aim: a rectangle or a disc in a plane that the sensor's rays reach through affine optics.
+    """An aim: a rectangle or a disc in a plane that the sensor's rays reach through affine optics.
 
     A ray from (x, y) on the sensor towards the window's point (a, b), −1 … 1 each, has the slopes
     (s, t) = slope_from_point · (a, b) + slope_from_sensor · (x, y) + offset + Σ slope_from_scatter · (δs, δt).
 
-    The last term makes up for what diffusers on the way will take from the ray's slope: which of its ways a ray
-    goes is drawn beforehand, so that it hits the window whatever the kernel.
+    The last term compensates for the deflection by diffusers on the way: the deflection of each ray is drawn
+    beforehand, so that it hits the window for any kernel.
 
     Args:
         slope_from_point: 2×2.
         slope_from_sensor: 2×2, 1/m.
         offset: (s, t).
         disc: whether the window is the disc a² + b² ≤ 1, not the whole square.
-        words: what is aimed at.
+        words: the target, as text.
         slope_from_scatter: (column of the table, 2×2) of each uniform diffuser before the window.
     """
 
@@ -50,12 +50,12 @@ class Window(Brief):
 
     @property
     def on_disc(self) -> bool:
-        """Whether rays take points of the unit disc, not of the square."""
+        """Whether rays use points of the unit disc, not of the square."""
         return self.disc
 
     @property
     def solid_angle(self) -> float:
-        """∫∫ ds dt over the window, the same seen from any place on the sensor."""
+        """∫∫ ds dt over the window, the same for any place on the sensor."""
         return (np.pi if self.disc else 4.0) * abs(float(np.linalg.det(self.slope_from_point)))
 
     def slopes(self, x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
@@ -72,7 +72,7 @@ class Window(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sight(Brief):
-    """How a place on the sensor, a place on a lens array and one at the stop beyond it hang together.
+    """The relations between a place on the sensor, a place on a lens array and a place at the stop beyond it.
 
     All are along (x, y), which do not mix. A ray that passes a cell with centre c and power P at place a meets the
     plane of the stop at gain·a + rest, with gain = beyond + P·beyond_from_slope.
@@ -81,7 +81,7 @@ class Sight(Brief):
         place_from_sensor: place on the array from place on the sensor, factors.
         place_from_slope: place on the array from slope at the sensor, factors.
         offset: of the place on the array.
-        beyond: place at the stop from place on the array, the slope at the sensor's side being that from the
+        beyond: place at the stop from place on the array, with the slope on the sensor's side as it comes from the
             sensor: factors.
         beyond_from_sensor: place at the stop from place on the sensor.
         beyond_from_slope: place at the stop from slope before the array.
@@ -99,7 +99,7 @@ class Sight(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stop(Brief):
-    """What a lens array's cells look at: a rectangle, or the ellipse in it.
+    """The stop seen through a lens array's cells: a rectangle, or the ellipse in it.
 
     Args:
         middle: (x, y).
@@ -114,12 +114,12 @@ class Stop(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellOpening(Brief):
-    """What of each cell of a lens array is open.
+    """The opening of each cell of a lens array.
 
     Args:
         half: half the (width, height) of the rectangle around it.
-        borders: (slope, half height) of the strips that cut it out, (strips, 2): from the cell's centre, y is
-            within slope·x ± half height.
+        borders: (slope, half height) of the strips that cut it out, (strips, 2): relative to the cell's centre,
+            y is within slope·x ± half height.
         radius: of round openings, infinite for others.
     """
 
@@ -129,11 +129,11 @@ class CellOpening(Brief):
 
     @property
     def highest(self) -> float:
-        """The largest y in it, from the cell's centre."""
+        """The largest y in it, relative to the cell's centre."""
         return self.radius if np.isfinite(self.radius) else float(self.half[1])
 
     def rows(self, away: Array) -> tuple[Array, Array]:
-        """The lowest and the highest y in it, from the cell's centre, at x = ``away`` from there."""
+        """The lowest and the highest y in it, relative to the cell's centre, at x = ``away`` from the centre."""
         low, high = np.full(away.shape, -np.inf), np.full(away.shape, np.inf)
         for slope, half in self.borders:
             low, high = np.maximum(low, slope * away - half), np.minimum(high, slope * away + half)
@@ -145,22 +145,22 @@ class CellOpening(Brief):
 
 @dataclass(frozen=True, eq=False)
 class CellWindows:
-    """Where to aim in front of a lens array: in each cell only at the part whose light comes from the stop beyond.
+    """An aim in front of a lens array: the part of each cell through which light from the stop beyond can arrive.
 
-    Only cells where places lead into the stop are aimed at, and of these only those places: the stop's image in
-    the plane of the array, cut by the borders of the cell's opening. Rays take x evenly from where both lie, and
-    then y evenly from what of them lies there: their weight is the width times the height, and what is seen jumps
-    at no border.
+    Rays are aimed only at cells, and places in them, that lead into the stop: the stop's image in the plane of the
+    array, intersected with the cell's opening. Rays take x evenly from the intersection's range, and
+    then y evenly from its range at this x. Their weight is the width times the height, and the integrand does
+    not jump at any border.
 
     Args:
-        cells: of the array, their lattice's offset counted from the axis of the camera.
-        opening: what of each of them is open.
-        sight: how the stop is seen through them.
-        stop: what is beyond.
-        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are looked at.
-        words: what is aimed at.
-        halvings: how many times a pixel's rays are halved for each of the cells that it sees.
-        towards: (number of the leg, words) of what bounds the rays beyond the array.
+        cells: of the array, with the lattice's offset relative to the axis of the camera.
+        opening: of each cell.
+        sight: relation between sensor, cells and stop.
+        stop: beyond the cells.
+        reach: (rows, columns) of cells on each side of the one nearest to the stop's image that are used.
+        words: the target, as text.
+        halvings: how often the number of a pixel's rays is halved for each of the cells that it sees.
+        towards: (number of the leg, words) of the bound of the rays beyond the array.
     """
 
     cells: CellDeflection
@@ -173,10 +173,10 @@ class CellWindows:
     towards: tuple[int, str] = (0, "")
 
     on_disc: ClassVar[bool] = False
-    """Rays take points of the square, whatever the stop."""
+    """Rays use points of the square, for any stop."""
 
     def nearest(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of the cell through whose centre the middle of the stop is seen from x, y, nearly."""
+        """(row, column) of the cell through whose centre the stop's middle is seen from x, y, approximately."""
         sight = self.sight
         centre = [
             (self.stop.middle[n] - sight.beyond_offset[n] - sight.beyond_from_sensor[n] * place) / sight.beyond[n]
@@ -185,7 +185,7 @@ class CellWindows:
         return self.cells.lattice.cell_of(*centre)
 
     def around(self, x: Array, y: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(row, column) of all cells that are looked at from places x, y: (..., cells) each."""
+        """(row, column) of all cells that are used from places x, y: (..., cells) each."""
         row, column = self.nearest(x, y)
         down, across = np.meshgrid(*(np.arange(-reach, reach + 1) for reach in self.reach), indexing="ij")
         return row[..., None] + down.reshape(-1), column[..., None] + across.reshape(-1)
@@ -203,7 +203,7 @@ class CellWindows:
     def aimed(
         self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64], points: Array
     ) -> tuple[Array, Array, Array]:
-        """Places (a, b) in the cells that light from x, y can come through, and the area that each stands for.
+        """Places (a, b) in the cells through which light can reach x, y, and the area that each stands for.
 
         ``points`` are (..., 2) of numbers −1 … 1.
         """
@@ -225,7 +225,7 @@ class CellWindows:
         return a, low + tall * (0.5 + 0.5 * points[..., 1]), wide * tall
 
     def meets(self, x: Array, y: Array, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether the stop's image seen from x, y can meet a cell's opening; where not, no light comes through."""
+        """Whether the stop's image seen from x, y can meet a cell's opening; if not, no light passes."""
         kind = row % self.cells.powers.shape[0], column % self.cells.powers.shape[1]
         half = self.opening.half[0], self.opening.highest
         found = np.ones(row.shape, dtype=np.bool_)
