@@ -62,7 +62,10 @@ def summed(camera, transmission, radiance, across=48, pixel=5):
         for column, x0 in enumerate(sensor.column_places):
             x, y = (each.ravel()[:, None] for each in np.meshgrid(x0 + within, y0 + within))
             s, t = (x - u) / sensor.z, (y - v) / sensor.z
-            before = [s + (u - lens.decentre[0]) / lens.focal_length, t + (v - lens.decentre[1]) / lens.focal_length]
+            before = [
+                s + (u - lens.decentre[0]) / lens.focal_length,
+                t + (v - lens.decentre[1]) / lens.focal_length,
+            ]
             light = radiance(np.stack(np.broadcast_arrays(u, v, *before), axis=-1))
             rays = np.stack(np.broadcast_arrays(x, y, s, t), axis=-1)
             image[row, column] = (light * transmission(rays)).sum() / pixel**2 * area / sensor.z**2
@@ -111,7 +114,7 @@ def test_a_louvre_before_the_sensor():
     image = camera.capture(textured_field(), samples=4096)
     truth = summed(camera, passes, scene, across=120)
     # Points of the truth lie 7 mm/120 apart, its edges err by some 1 % of it in each pixel: 50 dB and better.
-    assert decibels(image.to_numpy(), truth) > 45
+    print(decibels(image.to_numpy(), truth), image.sampling_error/truth.max()); assert decibels(image.to_numpy(), truth) > 45
     assert 0.1 < truth.mean() / summed(camera, lambda rays: 1.0, scene).mean() < 0.7
 
 
@@ -152,7 +155,9 @@ def test_photodiodes_add_up_to_the_ordinary_image(method):
         [LENS, vcc.Mask(patterns.mura(7), width=6 * mm, z=25 * mm)],
         [LENS, vcc.LensArray(2 * mm, 20 * mm, z=40 * mm)],
     ):
-        given = sensor(photodiodes=(2, 2), microlens=vcc.Microlens(f_number=8, pupil_distance=54 * mm, crosstalk=9 * um))
+        given = sensor(
+            photodiodes=(2, 2), microlens=vcc.Microlens(f_number=8, pupil_distance=54 * mm, crosstalk=9 * um)
+        )
         whole = vcc.Camera(elements, sensor()).capture(light_field, method=method).to_numpy()
         image = vcc.Camera(elements, given).capture(light_field, method=method)
         assert isinstance(image, vcc.image.PhotodiodeImage)
@@ -174,7 +179,7 @@ def test_each_photodiode_is_recorded_with_noise_of_its_own():
     electronics = vcc.Electronics(bit_depth=10, full_well=5000, read_noise=3.0, black_level=20)
     camera = vcc.Camera([LENS], sensor(photodiodes=(1, 2), electronics=electronics))
     light_field = textured_field()
-    recordings = [camera.expose(light_field, 1e-5, seed=seed) for seed in range(200)]
+    recordings = [camera.expose(light_field, 1e-6, seed=seed) for seed in range(200)]
     images = np.array([[one.values.astype(float) for one in each.photodiodes[0]] for each in recordings])
     left, right = (images[:, n] - images[:, n].mean(axis=0) for n in (0, 1))
     correlation = (left * right).mean() / math.sqrt((left**2).mean() * (right**2).mean())

@@ -50,9 +50,13 @@ class Microlens:
             raise InputError("give a microlens a height or an f_number, not both: h = f_number × pixel pitch")
         for name in ("height", "f_number"):
             if getattr(self, name) is not None:
-                checks.above_zero(f"{name} of the microlens", getattr(self, name), unit="m" if name == "height" else "")
+                checks.above_zero(
+                    f"{name} of the microlens", getattr(self, name), unit="m" if name == "height" else ""
+                )
         if self.pupil_distance is not None and not self.pupil_distance > 0:
-            raise InputError(f"pupil_distance of the microlens is {self.pupil_distance}: it is above 0, or infinite")
+            raise InputError(
+                f"pupil_distance of the microlens is {self.pupil_distance}: it is above 0, or infinite"
+            )
         if checks.finite("crosstalk of the microlens", self.crosstalk, "metres") < 0:
             raise InputError(f"crosstalk of the microlens is {self.crosstalk}: it is a width of 0 or more")
 
@@ -142,4 +146,3 @@ def photodiode_term(
     (top, bottom), (left, right) = edges
     of = np.column_stack([-height * chief.slope, height * np.eye(2), -height * chief.offset])
     return Term(SoftRectangle(left, right, top, bottom, microlens.crosstalk), of)
-

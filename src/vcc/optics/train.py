@@ -324,7 +324,10 @@ class Train(Value, Shown):
             stop_from_sensor = stage.leaving @ from_sensor
             by_slope = stop_from_sensor.linear[:2, 2:]
             half = min(stage.faces.pattern.size) / 2
-            if math.isfinite(half) and abs(np.linalg.det(by_slope)) > 1e-12 * max(np.abs(by_slope).max(), 1e-12) ** 2:
+            if (
+                math.isfinite(half)
+                and abs(np.linalg.det(by_slope)) > 1e-12 * max(np.abs(by_slope).max(), 1e-12) ** 2
+            ):
                 bound = half / float(np.linalg.norm(by_slope, 2))
                 if best is None or bound < best[0]:
                     middle = stage.element.decentre

@@ -409,7 +409,12 @@ def _draw_louvre(pen: Pen, louvre: Louvre) -> None:
             continue
         z = louvre.z + np.array([0.0, louvre.height, louvre.height, 0.0])
         pen.fill(
-            z, middle + thick / 2 * np.array([-1, -1, 1, 1]), facecolor="black", edgecolor="black", linewidth=0.8, zorder=2
+            z,
+            middle + thick / 2 * np.array([-1, -1, 1, 1]),
+            facecolor="black",
+            edgecolor="black",
+            linewidth=0.8,
+            zorder=2,
         )
 
 
