@@ -471,7 +471,7 @@ def _read_affine(given: Any, what: str, beside: Beside) -> Affine:
 
 
 def read_array(given: Any, unit: str | None, transmission: bool, what: str, beside: Beside) -> NDArray[np.float64]:
-    """An array from a file next to the camera file, or from nested lists; numbers with a unit carry it each."""
+    """An array from a file next to the camera file, or from nested lists; each number states its unit, if any."""
     if isinstance(given, str):
         if given in beside.arrays:
             return beside.arrays[given]

@@ -29,7 +29,7 @@ def write_file(path: Path, fill: Callable[[Any, Put], None], **options: Any) -> 
         options: options of `h5py.File`.
 
     Raises:
-        OSError: the disk refuses. The file is then incomplete.
+        OSError: the write fails. The file is then incomplete.
         BaseException: any other exception during writing; likewise.
     """
     state = _State()

@@ -332,7 +332,7 @@ def encode(
 
     Raises:
         InputError: no PyAV, or pictures that it cannot write.
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     av = library()
     try:

@@ -66,7 +66,7 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
         maps: the maps, with their source.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec

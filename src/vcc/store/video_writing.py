@@ -84,8 +84,8 @@ class VideoWriter:
 
         Raises:
             InputError: not a light field; a time that is not after the last; a grid that differs from earlier
-                frames (the difference is named); as in `vcc.store.convert`; this writer has ended; the disk
-                refuses. Earlier frames stay.
+                frames (the difference is named); as in `vcc.store.convert`; this writer has ended; the write
+                fails. Earlier frames stay.
         """
         check_is_light_field(light_field)
         kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
@@ -273,7 +273,7 @@ def create_video(
 
     Raises:
         InputError: the path is something else; an invalid argument; a video with another ``between``, or a
-            damaged one; another process writes it (named); the disk refuses.
+            damaged one; another process writes it (named); the write fails.
     """
     folder = expanded(path)
     if between is not None:

@@ -105,7 +105,7 @@ class StoreWriter:
 
         Raises:
             InputError: the store is finished; no such view; another shape or type; samples that are NaN,
-                infinite, negative or too large; the disk refuses (full, no permission). Views written before
+                infinite, negative or too large; the write fails (full, no permission). Views written before
                 stay.
         """
         nv, nu = self.shape[:2]
@@ -136,7 +136,7 @@ class StoreWriter:
         """Mark the store as complete and open it.
 
         Raises:
-            InputError: views are missing (named), or the disk refuses.
+            InputError: views are missing (named), or the write fails.
         """
         if self.attributes.complete:
             self._lock.give_back()
@@ -240,7 +240,7 @@ def create_store(
 
     Raises:
         InputError: an invalid shape, type or attribute; a path that is something else; a store of another
-            description (the difference is named); another process writes the store (named); the disk refuses.
+            description (the difference is named); another process writes the store (named); the write fails.
     """
     folder = Path(path).expanduser()
     frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
@@ -392,7 +392,7 @@ def in_one_piece(
         put: renames the finished store.
 
     Raises:
-        InputError: as raised within, with the final name of the store; the disk refuses; views are missing.
+        InputError: as raised within, with the final name of the store; the write fails; views are missing.
     """
     try:
         with begin() as writer:
