@@ -120,7 +120,7 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
     try:
         if path.suffix.lower() == ".npy":
             if key is not None:
-                raise InputError(f"{path} holds one array without a name, so key={key!r} means nothing")
+                raise InputError(f"{path} holds one array without a name: leave key={key!r} out")
             return {"values": read_npy(path)}
         with path.open("rb") as file:
             loaded = np.load(file, allow_pickle=False, mmap_mode="r")

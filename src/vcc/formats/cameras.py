@@ -65,9 +65,9 @@ def cameras_of(grid: Grid) -> Cameras:
     """
     linear, (nv, nu, nt, ns) = grid.frame.linear, grid.shape[:4]
     fault = InputError(
-        "the frame of this light field is not that of cameras on a grid centred on the axis (it was cut, turned "
-        "or has flown on), which a folder of pictures cannot state. Write a .zarr, .npz or .mat, which keep any "
-        "frame"
+        "the frame of this light field is not that of cameras on a grid centred on the axis (it was cropped, "
+        "rotated or propagated), so a folder of pictures cannot store it. Write a .zarr, .npz or .mat, which keep "
+        "any frame"
     )
     du, dv, ps, pt = map(float, (linear[0, 0], linear[1, 1], -linear[2, 2], -linear[3, 3]))
     if not min(du, dv, ps, pt) > 0:

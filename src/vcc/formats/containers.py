@@ -55,7 +55,7 @@ def read_container(path: Path, progress: Progress | None = None, **options: Any)
     with reading(path, "a light field"):
         module = container_of(path)
         if module is None:
-            raise InputError(f"{path} is in no format that is known")
+            raise InputError(f"{path} is not in a supported format")
         return _read(module, path, progress, options)
 
 
@@ -65,7 +65,7 @@ def _read(module: ModuleType, path: Path, progress: Progress | None, options: di
     for option in options:
         if option not in taken:
             takes = f"takes {', '.join(taken)}" if taken else "takes no options"
-            raise InputError(f"{path}: {option}= means nothing to this format, which {takes}")
+            raise InputError(f"{path}: {option}= is not supported by this format, which {takes}")
     if "progress" in parameters:
         options["progress"] = progress
     decoded: Decoded = module.read(path, **options)

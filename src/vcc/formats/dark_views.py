@@ -62,4 +62,4 @@ def dark_notice(views: Mapping[Place, NDArray[Any]]) -> str:
     words = dark_words({place: mean_light(view, "linear") for place, view in views.items()})
     if not words:
         return ""
-    return f"{words}. A camera takes them for light that does not come: cut them off, like light_field[1:-1, 1:-1]"
+    return f"{words}. A camera treats them as missing light: crop them, as in light_field[1:-1, 1:-1]"

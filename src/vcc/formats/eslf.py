@@ -145,7 +145,7 @@ def _layout(samples: NDArray[Any], views: tuple[int, int], known: tuple[int, int
     if known == views:
         return "eslf"
     raise InputError(
-        f"{path} does not tell whether it is a mosaic of {views[0]}×{views[1]} views or an ESLF (the block of "
+        f"{path} does not show whether it is a mosaic of {views[0]}×{views[1]} views or an ESLF (the block of "
         'views behind each lenslet tiled): pass layout="mosaic" or layout="eslf"'
     )
 
@@ -157,13 +157,13 @@ def _cut_off(height: int, width: int, views: tuple[int, int], layout: Layout, pa
         return ()
     if layout == "mosaic":
         raise InputError(
-            f"{path}: {height}×{width} pixels (rows × columns) are no whole number of tiles, {rows}×{columns} of "
-            "them. Correct views=, or crop the picture to the views"
+            f"{path}: {height}×{width} pixels (rows × columns) are not a multiple of {rows}×{columns} "
+            "tiles. Correct views=, or crop the picture to the views"
         )
     return (
-        f"{height}×{width} pixels (rows × columns) are no whole number of blocks of {rows}×{columns} views; "
-        f"the last {height % rows} rows and {width % columns} columns, cut off blocks, were left out. Is it a "
-        "mosaic, or are views= others?",
+        f"{height}×{width} pixels (rows × columns) are not a multiple of blocks of {rows}×{columns} views; "
+        f"the last {height % rows} rows and {width % columns} columns were left out. Is it a "
+        "mosaic, or is views= wrong?",
     )
 
 

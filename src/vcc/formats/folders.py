@@ -79,13 +79,13 @@ def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
 def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, options: Collection[str]) -> None:
     if not check_path(folder, "folder or file"):
         raise InputError(
-            f"{folder} is a file in no format that is known. A light field is opened from a folder with a picture "
+            f"{folder} is not a file in a supported format. A light field is opened from a folder with a picture "
             "for each view, or from one of the files that docs/files.md lists"
         )
     if (folder / "zarr.json").is_file():
         raise InputError(f"{folder} is a store, which is read in pieces: open it with vcc.store.open_store")
     for option in options:
-        raise InputError(f"{option}= means nothing to a folder of views")
+        raise InputError(f"{option}= is not supported for a folder of views")
     orders.check(views, order)
 
 

@@ -78,7 +78,7 @@ def _of_folder(folder: Path) -> GroundTruth:
         if found is not None:
             return found
     raise InputError(
-        f"{folder} holds no true disparity or depth that is known: gt_disp_lowres.pfm, disparity_1_1.npy or "
+        f"{folder} holds no supported true disparity or depth: gt_disp_lowres.pfm, disparity_1_1.npy or "
         "disparity.npy with param.txt. Name the .pfm or .npy file itself"
     )
 
@@ -172,7 +172,7 @@ def _named_quantity(path: Path) -> Quantity:
     is_disparity, is_depth = "disp" in name, "depth" in name
     if is_disparity == is_depth:
         raise InputError(
-            f'{path} does not tell whether it holds disparities or depths: put "disp" or "depth" in its name'
+            f'{path} does not state whether it holds disparities or depths: put "disp" or "depth" in its name'
         )
     return "disparity" if is_disparity else "depth"
 

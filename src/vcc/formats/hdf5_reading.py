@@ -40,7 +40,7 @@ def found(parent: Any, name: str, path: Path) -> Any:
     at = parent
     for part in name.split("/"):
         if not isinstance(at, h5py.Group):
-            raise InputError(f"{path}: {at.name} is no group, and {name} should be in it")
+            raise InputError(f"{path}: {at.name} is not a group, so {name} cannot be in it")
         link = at.get(part, getlink=True)
         if link is None:
             return None
@@ -59,7 +59,7 @@ def group(parent: Any, name: str, path: Path) -> Any:
     Raises:
         InputError: the object is not a group; or as in `found`.
     """
-    return _of_kind(hdf5.library().Group, "no group", parent, name, path)
+    return _of_kind(hdf5.library().Group, "not a group", parent, name, path)
 
 
 def dataset(parent: Any, name: str, path: Path) -> Any:
@@ -162,7 +162,7 @@ def _stored(data: Any, path: Path) -> NDArray[Any]:
     """Read the elements of a data set after checking that all of them are in the file."""
     check_declared_size(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     if data.external or data.is_virtual:
-        raise InputError(f"{path}: {data.name} lies in another file, which is not read. Copy it into this one")
+        raise InputError(f"{path}: {data.name} is in another file, which is not read. Copy it into this one")
     if data.chunks is not None:
         return _from_chunks(data, path)
     compact = data.id.get_create_plist().get_layout() == hdf5.library().h5d.COMPACT

@@ -60,7 +60,7 @@ class _Bytes:
     def __call__(self, at: int, size: int) -> bytes:
         found = self._data[self._start + at : self._start + at + size] if at < len(self._data) else b""
         if len(found) != size:
-            raise NotReadable("it lies outside of the file")
+            raise NotReadable("it is outside the file")
         return found
 
     def number(self, at: int, size: int) -> int:
@@ -140,7 +140,7 @@ def _text(content: _Bytes, place: bytes) -> str:
     if length == 0:
         return ""
     if content(address, 4) != b"GCOL":
-        raise NotReadable("its place is none of texts")
+        raise NotReadable("its address is not a collection of texts")
     end = address + content.number(address + 8, 8)
     at = address + _HEADER
     while at + _HEADER <= end:
@@ -150,4 +150,4 @@ def _text(content: _Bytes, place: bytes) -> str:
         if found == 0:  # the rest is free space
             break
         at += _HEADER + -(-size // 8) * 8
-    raise NotReadable("it is not at its place")
+    raise NotReadable("it is not at its address")

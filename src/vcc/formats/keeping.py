@@ -63,8 +63,8 @@ def keep_geometry(
 def _refuse_a_file(folder: Path) -> None:
     if containers.container_of(folder) is not None:
         raise InputError(
-            f"{folder} is one file, beside which no camera file is read: make a store of it, which states its "
-            "cameras (vcc convert, or vcc.store.save_store)"
+            f"{folder} is a single file, for which no camera file is read: convert it to a store, which states "
+            "its cameras (vcc convert, or vcc.store.save_store)"
         )
 
 
@@ -72,7 +72,7 @@ def _text(grid: ViewGrid, folder: Path, given: Given) -> str:
     """The text of ``parameters.cfg`` for a folder."""
     there = hci.parameters_file(folder)
     if there is not None:
-        raise InputError(f"{there} states the cameras already: correct what it says, or move it away first")
+        raise InputError(f"{there} states the cameras already: correct it, or move it away first")
     info = info_of_grid(grid)
     if not info.unknown and not given.names:
         raise InputError(
@@ -90,5 +90,5 @@ def _text(grid: ViewGrid, folder: Path, given: Given) -> str:
     )
     assumed = [name for name in info.unknown if name not in given.names]
     if assumed:
-        text = f"# Assumed, since neither the files nor anybody said it: {', '.join(assumed)}\n{text}"
+        text = f"# Assumed, because neither the files nor the user stated them: {', '.join(assumed)}\n{text}"
     return text

@@ -93,7 +93,7 @@ class Container:
         if header[: len(_FILE)] != _FILE:
             raise self.fault(
                 f"it begins with {header[:8].hex(' ').upper() or 'nothing'}, not with "
-                f"{_FILE.hex(' ').upper()}, so it is no container of a Lytro camera"
+                f"{_FILE.hex(' ').upper()}, so it is not a container of a Lytro camera"
             )
         place, contents = _FILE_HEADER, None
         while place < self._size:
@@ -103,7 +103,7 @@ class Container:
                 if not header.strip(b"\0"):
                     break  # padding after the last section
                 raise self.fault(
-                    f"at byte {place:,} stands {header[:8].hex(' ').upper()}, and no section begins so"
+                    f"byte {place:,} begins with {header[:8].hex(' ').upper()}, not the start of a section"
                 )
             length = int.from_bytes(header[12:16], "big")
             start = place + _SECTION_HEADER

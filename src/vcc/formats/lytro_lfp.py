@@ -268,7 +268,7 @@ class _Recording:
             except (TypeError, ValueError):
                 matrix = np.full((3, 3), np.nan)
             if not np.isfinite(matrix).all():
-                raise self._container.fault(f"image.color.{name} of its metadata is no matrix of 3×3 numbers")
+                raise self._container.fault(f"image.color.{name} of its metadata is not a matrix of 3×3 numbers")
             return matrix
         return None
 

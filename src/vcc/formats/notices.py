@@ -33,8 +33,8 @@ def assumed_notice(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequ
         "focus_distance": "focus_distance=inf (parallel views)",
     }
     return (
-        f"the files ({info.format}) do not state {', '.join(assumed)}; taken are "
-        f"{', '.join(texts[name] for name in assumed)}. Distances and blur are only as right as these: "
+        f"the files ({info.format}) do not state {', '.join(assumed)}; assumed are "
+        f"{', '.join(texts[name] for name in assumed)}. Distances and blur are only as accurate as these: "
         f"pass {', '.join(f'{name}=…' for name in assumed)} (lengths in metres) if you know better"
         f"{_how_to_keep(info, path)}"
     )
@@ -61,7 +61,7 @@ def overruled_notice(info: FolderInfo, given: Given) -> str:
             parts.append(f"{name} is {stated:.4g}{unit} by the files and {wanted:.4g}{unit} as given")
     if not parts:
         return ""
-    return f"{'; '.join(parts)}: taken is what is given. Leave it out to take what the files state"
+    return f"{'; '.join(parts)}: the given value is used. Leave it out to use the value of the files"
 
 
 def _how_to_keep(info: FolderInfo, path: Path) -> str:

@@ -92,13 +92,13 @@ def _line(
     if span < count and (first != 0 or step != 1):
         raise InputError(
             f"{folder} has {len(numbered)} of {count} numbered views, from {first} to {last}, and which of the "
-            "others are missing cannot be known. Add them, or list those that there are in a views.csv"
+            "others are missing is unknown. Add them, or list the existing views in a views.csv"
         )
     missing = count - len(numbered)
     if missing and (not sparse or count > MOST_PLACES):
         named = (number for number in range(first, first + count * step, step) if number not in numbered)
         verb = "is" if missing == 1 else "are"
-        way_out = "Add them, or open those that there are with vcc.formats.open_sparse_views"
+        way_out = "Add them, or open the existing views with vcc.formats.open_sparse_views"
         raise InputError(
             f"{folder} has {len(numbered)} of {count} numbered views; {missing} {verb} missing: "
             f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"

@@ -98,7 +98,7 @@ def arrangement(
     if views is not None and 1 in views:
         return views, order or "row-major"
     if len({small.shape for small in thumbnails}) > 1:
-        raise InputError(f"{what}, and they are not all of one size. Move away what is no view")
+        raise InputError(f"{what}, and they are not all of one size. Move away files that are not views")
     if count > _MOST:
         raise InputError(
             f"{what}, too many to be compared with one another: pass views=(rows, columns) and order="
@@ -126,9 +126,7 @@ def arrangement(
             return (1, count), "row-major"
     if len(found) > 1 and not found[1].difference > _CLEARLY * found[0].difference:
         likely = " or ".join(f'views={c.views}, order="{c.order}"' for c in found[:2])
-        raise InputError(
-            f"{what}, and they do not tell how they are arranged. Pass {likely}, or whatever is right"
-        )
+        raise InputError(f"{what}, but their arrangement is not clear. Pass {likely}, or the correct arrangement")
     return found[0].views, found[0].order
 
 

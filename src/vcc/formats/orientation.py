@@ -119,8 +119,8 @@ def _frame_notice(frame: Affine, found: parallax.Orientation) -> str:
     if found.verdict == "undetermined" or found.verdict == ("flipped" if opposite else "agrees"):
         return ""
     return (
-        f'parallax calls the view axes "{found.verdict}" (certainty {found.score:.0%}), which the frame that the '
-        'file states does not say. Nothing was changed: pass orientation="flip-rows", "flip-columns" or '
+        f'parallax calls the view axes "{found.verdict}" (certainty {found.score:.0%}), which contradicts the '
+        'frame that the file states. Nothing was changed: pass orientation="flip-rows", "flip-columns" or '
         '"transpose" to rearrange the views'
     )
 

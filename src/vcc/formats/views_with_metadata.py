@@ -40,7 +40,7 @@ class ViewsWithMetadata:
         for file, each in said.items():
             if each.recording is not None:
                 raise InputError(
-                    f"{file} says that it holds {each.in_words}: a raw recording is no view, decode it"
+                    f"{file} states that it holds {each.in_words}: a raw recording is not a view, decode it"
                 )
         first = next(iter(said), None)
         if first is None:
@@ -53,8 +53,8 @@ class ViewsWithMetadata:
                 )
             if silent and (each.transfer != "srgb" or not each.is_neutral):
                 raise InputError(
-                    f"{file.name} says that its numbers are {each.in_words}, and {silent[0].name} does not say "
-                    "what its are: it is not of the same make. Write all views anew"
+                    f"{file.name} says that its numbers are {each.in_words}, and {silent[0].name} has no "
+                    "metadata. Write all views again in the same way"
                 )
         return cls(said, said[first].transfer)
 
@@ -93,7 +93,7 @@ class ViewsWithMetadata:
         """
         picture = ImageWithMetadata(file, samples, self.said[file], changed=not self.said[file].fits(samples))
         if picture.changed:
-            raise InputError(f"{unknown(picture)}: write all views anew, without descriptions")
+            raise InputError(f"{unknown(picture)}: write all views again, without descriptions")
         return picture
 
     def light(self, file: Path, samples: NDArray[Any]) -> NDArray[np.float32]:

@@ -55,8 +55,8 @@ _PNG_LEVEL = 4  # a third of the default level's time, for 5 % more bytes
 DARK = 0.05
 """Fraction of white: views with darker maxima lose detail in 8 bits and look black."""
 _POINTS_UNSAID = (
-    "nothing here says that its samples are values at points, and they are read back as means over pixels: "
-    'dataclasses.replace(light_field, sample="point") says it again'
+    "this format cannot state that samples are values at points, so they are read as means over pixels: restore "
+    'the setting with dataclasses.replace(light_field, sample="point")'
 )
 
 
@@ -129,7 +129,7 @@ def save_light_field(
     for option in options:
         if option not in taken:
             takes = f"takes {', '.join(sorted(taken))}" if taken else "takes no options"
-            raise InputError(f'{path}: {option}= means nothing to the format "{chosen}", which {takes}')
+            raise InputError(f'{path}: {option}= is not supported by the format "{chosen}", which {takes}')
     if chosen in ("hci", "views"):
         saved: SavedLightField = writer(light_field, path, kind=chosen, progress=progress, **options)
         return saved
@@ -240,7 +240,7 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
         return chosen
     checks.one_of("kind", kind, get_args(Kind))
     if kind not in _FOLDERS and ending != _ENDINGS[kind]:
-        raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {_ENDINGS[kind]}')
+        raise InputError(f'kind="{kind}" does not match the name "{path.name}": end it in {_ENDINGS[kind]}')
     return kind
 
 
@@ -296,7 +296,7 @@ def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure
             f'the pictures of a folder of the kind "{kind}" end in {" or ".join(endings)}, not "{ending}"'
         )
     if ending == ".exr" and exposure != 1:
-        raise InputError(f"exposure={exposure} has no place in .exr files, which hold the samples untouched")
+        raise InputError(f"exposure={exposure} is not supported for .exr files, which hold the samples unchanged")
     if grid.channels not in (None, 1, 3):
         raise InputError(
             f"pictures have 1 or 3 channels, and this light field has {grid.channels}: choose channels, "

@@ -42,7 +42,7 @@ class Glasses:
     def __post_init__(self) -> None:
         if not _SHORTEST <= self.wavelength <= _LONGEST:
             raise InputError(
-                f"wavelength is {self.wavelength} m: give that of light in metres, e.g. 587.6 * vcc.units.nm"
+                f"wavelength is {self.wavelength} m: give one of light in metres, e.g. 587.6 * vcc.units.nm"
             )
         object.__setattr__(self, "given", {name.upper(): index for name, index in self.given.items()})
 
@@ -73,7 +73,7 @@ class Glasses:
             close = difflib.get_close_matches(name.upper(), list(_catalogue()), n=3, cutoff=0.75)
             hint = f" Names like it: {', '.join(close)}." if close else ""
             raise InputError(
-                f'{place}: no catalogue lists a glass "{name}" (asked: {", ".join(_makers())}).{hint} '
+                f'{place}: no catalogue lists a glass "{name}" (searched: {", ".join(_makers())}).{hint} '
                 f"Correct the name in the file, {way_out}"
             )
         return self._chosen(found, name, catalogues, place, way_out)

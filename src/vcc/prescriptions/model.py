@@ -90,7 +90,7 @@ class Prescription(Brief):
             if not (surface.thickness >= 0 and math.isfinite(surface.thickness)):
                 raise InputError(
                     f"{place}: the gap behind surface {surface.number} is {surface.thickness * 1e3:g} mm: light "
-                    "would travel backwards. List the surfaces in the order in which they stand on the axis"
+                    "would travel backwards. List the surfaces in their order along the axis"
                 )
         stops = [surface.number for surface in self.surfaces if surface.stop]
         if len(stops) > 1:
@@ -247,6 +247,6 @@ class Prescription(Brief):
         if abs(matrix[0, 0]) < 1e-12:
             raise InputError(
                 f"{self.source or 'this prescription'}: the entrance pupil lies at infinity (telecentric), so no "
-                "f-number and no pupil diameter say how wide the stop is: give stop_diameter"
+                "f-number and no pupil diameter determine the width of the stop: give stop_diameter"
             )
         return float(abs(matrix[0, 0]))

@@ -148,7 +148,7 @@ def _number(lines: _Lines, keyword: str, column: int, place: str, file: Path) ->
 def _unit(head: _Lines, file: Path) -> float:
     values = head.values("UNIT")
     if not values:
-        raise InputError(f"{file} does not say its unit of length: it needs a line UNIT MM")
+        raise InputError(f"{file} does not state its unit of length: add a line UNIT MM")
     if values[0].upper() not in _UNITS:
         raise InputError(f"{file}: its unit of length {values[0]} is not known; known are {', '.join(_UNITS)}")
     return _UNITS[values[0].upper()]

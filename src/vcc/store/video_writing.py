@@ -194,7 +194,7 @@ class VideoWriter:
             self._times.append(place.time)
             settle_names(self.path)
         except OSError as error:
-            raise InputError(f"{part} could not be settled: {error.strerror or error}") from error
+            raise InputError(f"{part} could not be flushed to the disk: {error.strerror or error}") from error
 
     def _following(self, time: float) -> float:
         """Check that a time is after all existing frames.
@@ -286,7 +286,7 @@ def create_video(
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there and not is_video(folder):
-        raise InputError(f"{folder} is there already, and is no video of light fields: choose another name")
+        raise InputError(f"{folder} exists already, and is not a video of light fields: choose another name")
     lock = WriterLock(folder)
     try:
         clear_leftovers(folder, lock.patience)
