@@ -33,7 +33,7 @@ def test_silly_values_are_taken_or_refused_in_words(given, count, seed):
         (
             ["elements", 0, "kind"],
             [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]]],
-            "is made of lists in lists",
+            "is nested too deeply",
         ),
         (
             ["elements", 1, "pattern"],

@@ -459,7 +459,7 @@ REFUSED = {
     "silent.tif --transfer linear": "say it with --upside-down (as light lies on a sensor) or --upright",
     "silent.tif --transfer srgb --upright --black 3": "--black counts raw numbers",
     "silent.npy --transfer srgb --upright": "it holds floating point, which is linear",
-    "changed.tif": "another program has changed them",
+    "changed.tif": "another program has changed the numbers",
 }
 
 

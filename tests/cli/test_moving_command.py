@@ -71,11 +71,11 @@ def test_explain_says_what_changes(frames):
         ("capture still.toml s.zarr -o p.npy --exposure-time 1ms", "still.toml has no table [moving]"),
         ("capture still.toml s.zarr -o p.npy --time-tolerance 0.1", "leave out --time-tolerance"),
         ("capture camera.toml s.zarr -o p.npy --exposure-time 9", "needs a unit"),
-        ("expose camera.toml s.zarr -o p.npy", "vcc capture takes it with --exposure-time"),
-        ("plot camera.toml -o p.png", "vcc capture takes it with --exposure-time"),
-        ("sweep camera.toml s.zarr --set main.z=1mm -o t.csv", "vcc capture takes it with --exposure-time"),
-        ("bench camera.toml s.zarr", "vcc capture takes it with --exposure-time"),
-        ("decode raw.tif --camera camera.toml -o f.zarr", "vcc capture takes it with --exposure-time"),
+        ("expose camera.toml s.zarr -o p.npy", "run vcc capture with --exposure-time"),
+        ("plot camera.toml -o p.png", "run vcc capture with --exposure-time"),
+        ("sweep camera.toml s.zarr --set main.z=1mm -o t.csv", "run vcc capture with --exposure-time"),
+        ("bench camera.toml s.zarr", "run vcc capture with --exposure-time"),
+        ("decode raw.tif --camera camera.toml -o f.zarr", "run vcc capture with --exposure-time"),
     ],
 )
 def test_what_cannot_be_is_refused_with_the_way_out(frames, command, words):

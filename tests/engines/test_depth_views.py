@@ -199,7 +199,7 @@ def test_disparities_are_found_once_and_kept_in_the_store(tmp_path, monkeypatch)
         FAR_OUT_OF_FOCUS.capture(lf[1:, :, :20], between_views="none").values,
     )
     (tmp_path / "a.zarr" / "disparity" / "zarr.json").write_text("{}")
-    with pytest.raises(vcc.InputError, match="Delete this folder, and they are found again"):
+    with pytest.raises(vcc.InputError, match="Delete this folder to compute them again"):
         FAR_OUT_OF_FOCUS.capture(open_store(tmp_path / "a.zarr"), between_views="depth")
 
 

@@ -175,7 +175,7 @@ def test_linear_files_keep_the_values(shape: tuple[int, ...], ending: str, tmp_p
     read, bits = read_picture(saved.path)
     assert (saved.exposure, bits) == (1, 32)
     np.testing.assert_array_equal(read, values)
-    with pytest.raises(InputError, match="untouched"):
+    with pytest.raises(InputError, match="hold the values unchanged"):
         image(values).save(saved.path, exposure=2)
     with pytest.raises(InputError, match="not 16 bits"):
         image(values).save(saved.path, bits=16)
@@ -326,10 +326,10 @@ def test_nothing_is_written_to_a_buffer_of_what_cannot_be_written() -> None:
     ("target", "format", "message"),
     [
         (io.BytesIO(), None, r"add format=, png, tif, tiff, jpg, jpeg, exr, npy$"),
-        (io.BytesIO(), "gif", r'format="gif": there are png'),
+        (io.BytesIO(), "gif", r'format="gif": supported are png'),
         (io.StringIO(), "png", "takes text: use io.BytesIO"),
         (3, None, "not to a int"),
-        ("picture.tif", "png", "does not go with picture.tif"),
+        ("picture.tif", "png", "contradicts the ending of picture.tif"),
     ],
 )
 def test_where_pictures_cannot_go(target: object, format: str | None, message: str) -> None:

@@ -242,7 +242,7 @@ def test_hci_truth(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "values", "message"),
     [
-        (".", None, "holds no true disparity"),
+        (".", None, "holds no supported true disparity"),
         ("nothing", None, "no file or folder"),
         ("map.npy", np.zeros((2, 2)), 'put "disp" or "depth" in its name'),
         ("depth.npy", np.zeros((2, 2, 2)), r"shape \(2, 2, 2\)"),

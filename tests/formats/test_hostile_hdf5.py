@@ -131,8 +131,8 @@ def early(file: Any) -> None:
             lambda f: f.create_dataset("LF", (2, 2, 2**15, 2**15), "u1", chunks=True),
             "claims 4,294,967,296 bytes",
         ),
-        (external, "lies in another file"),
-        (virtual, "lies in another file"),
+        (external, "is in another file"),
+        (virtual, "is in another file"),
         (linked(h5py.ExternalLink("/etc/passwd", "/x")), r"is a link to another place \(ExternalLink\)"),
         (linked(h5py.SoftLink("/LF")), r"is a link to another place \(SoftLink\)"),
         (linked(h5py.SoftLink("/there")), r"is a link to another place \(SoftLink\)"),
@@ -165,10 +165,10 @@ def collection(data: bytes) -> int:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda d, at: struct.pack_into("<HHIQ", d, at + 16, 0, 0, 0, 0), "it is not at its place"),
-        (lambda d, at: struct.pack_into("<HHIQ", d, at + 16, 7, 0, 0, 2**64 - 16), "it is not at its place"),
-        (lambda d, at: d.__setitem__(slice(at, at + 4), b"LOCG"), "its place is none of texts"),
-        (lambda d, at: place(d, at, "<I", 2**32 - 1, -4), "it is not at its place"),
+        (lambda d, at: struct.pack_into("<HHIQ", d, at + 16, 0, 0, 0, 0), "it is not at its address"),
+        (lambda d, at: struct.pack_into("<HHIQ", d, at + 16, 7, 0, 0, 2**64 - 16), "it is not at its address"),
+        (lambda d, at: d.__setitem__(slice(at, at + 4), b"LOCG"), "its address is not a collection of texts"),
+        (lambda d, at: place(d, at, "<I", 2**32 - 1, -4), "it is not at its address"),
     ],
 )
 def test_texts_that_stop_the_library(
@@ -218,7 +218,7 @@ def matlab(path: Path, **variables: Any) -> Path:
         ({"DecodeOptions__OptionalTasks": np.array([b"a"])}, "not references"),
         ({"RectOptions__RectCamIntrinsicsH": np.array(["a"], dtype=h5py.string_dtype())}, "not numbers"),
         ({"RectOptions__RectCamIntrinsicsH__a": np.eye(5)}, "RectCamIntrinsicsH is a group"),
-        ({"RectOptions": np.eye(5)}, "is no group"),
+        ({"RectOptions": np.eye(5)}, "is not a group"),
     ],
 )
 def test_variables_of_another_kind(variables: dict[str, Any], message: str, tmp_path: Path) -> None:

@@ -60,7 +60,7 @@ def test_what_has_no_place_or_no_need_is_refused(views, folder_of, tmp_path):
     with pytest.raises(vcc.InputError, match="state all of its cameras, so there is nothing to keep"):
         keep_geometry(stated)
     vcc.formats.save_light_field(opened_in_silence(stated), tmp_path / "field.npz")
-    with pytest.raises(vcc.InputError, match=r"field\.npz is one file"):
+    with pytest.raises(vcc.InputError, match=r"field\.npz is a single file"):
         keep_geometry(tmp_path / "field.npz", **GIVEN)
     with pytest.raises(vcc.InputError, match="spacing"):
         keep_geometry(folder_of(views, lambda j, i: f"view_{j}_{i}.png", "other"), spacing=-1.0)

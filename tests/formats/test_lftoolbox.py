@@ -188,7 +188,7 @@ def test_files_that_cannot_be_read(write: Any, message: str, tmp_path: Path) -> 
 
 def test_options_of_other_formats_are_refused(tmp_path: Path) -> None:
     by_hand(tmp_path / "a.mat")
-    with pytest.raises(InputError, match=r"views= means nothing to this format"):
+    with pytest.raises(InputError, match=r"views= is not supported by this format"):
         open_light_field(tmp_path / "a.mat", views=(2, 3))
 
 

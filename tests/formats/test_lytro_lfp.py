@@ -222,7 +222,7 @@ def refused(tmp_path, data):
         (b"PK\3\4" + bytes(100), "begins with 50 4B 03 04 00 00 00 00"),
         (b"", "begins with nothing"),
         (FILE, "no table of contents"),
-        (FILE + b"\1" * 200, "no section begins so"),
+        (FILE + b"\1" * 200, "not the start of a section"),
     ],
 )
 def test_what_is_no_container_is_refused(tmp_path, data, words):
@@ -255,7 +255,7 @@ FULL = dict.fromkeys(LEVELS, 60)
         ({"width": 8, "height": 7}, "has 70 bytes, and this one has 60"),
         ({"width": -8}, "a picture of -8×6"),
         ({"mosaic": {"upperLeftPixel": "w"}}, 'upper left pixel of its colour filter is "w"'),
-        ({"color": {"ccm": [1, 2]}}, "no matrix of 3×3"),
+        ({"color": {"ccm": [1, 2]}}, "not a matrix of 3×3"),
         ({"pixelFormat": {"black": LEVELS}}, "black levels of"),
         ({"pixelFormat": {"black": {"r": 1}}}, "for some of the colours only"),
         ({"pixelFormat": {"black": FULL, "white": FULL}}, "not above the black ones"),

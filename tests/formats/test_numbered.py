@@ -99,7 +99,7 @@ def test_a_single_row(tmp_path: Path) -> None:
 def test_what_is_not_told_and_not_seen(tmp_path: Path) -> None:
     same = np.broadcast_to(moving_texture(1, 1), (2, 6, 48, 64, 3))
     folder = write(same, "row-major", tmp_path / "a")
-    with pytest.raises(InputError, match=r"12 numbered pictures, and they do not tell.*Pass views="):
+    with pytest.raises(InputError, match=r"12 numbered pictures, but their arrangement is not clear.*Pass views="):
         open_light_field(folder)
     assert read_geometry(folder, views=(2, 6), order="row-major").columns == 6
 
@@ -118,7 +118,7 @@ def test_missing_numbers(grid: Views, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="incomplete: pass views"):
         open_sparse_views(folder)
     (folder / "frame_000.png").unlink()
-    with pytest.raises(InputError, match=r"17 of 20 numbered views, from 1 to 18, and .*cannot be known"):
+    with pytest.raises(InputError, match=r"17 of 20 numbered views, from 1 to 18, and .*missing is unknown"):
         open_sparse_views(folder, views=(4, 5), order="row-major")
 
 
@@ -127,7 +127,7 @@ def test_missing_numbers(grid: Views, tmp_path: Path) -> None:
     [
         ({"order": "spiral"}, "order is one of .*not 'spiral'"),
         ({"views": (0, 5)}, r"views is \(rows, columns\)"),
-        ({"every": 2}, "every= means nothing to a folder"),
+        ({"every": 2}, "every= is not supported for a folder"),
         ({"views": (2, 3)}, r"20 numbered pictures, and views=\(2, 3\) would be 6"),
     ],
 )

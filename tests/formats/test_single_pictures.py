@@ -117,7 +117,7 @@ def test_a_picture_that_does_not_tell_its_layout(flat: bool, samples: NDArray[np
     views = np.full_like(samples, 7) if flat else samples
     path = write(tmp_path / "a.png", side_by_side(views))
     with pytest.raises(
-        InputError, match=r'does not tell .* mosaic of 2×3 views .*layout="mosaic" or layout="eslf"'
+        InputError, match=r'does not show .* mosaic of 2×3 views .*layout="mosaic" or layout="eslf"'
     ):
         read_container(path, views=(2, 3))
     np.testing.assert_array_equal(read_container(path, views=(2, 3), layout="mosaic").values, views)
@@ -125,7 +125,7 @@ def test_a_picture_that_does_not_tell_its_layout(flat: bool, samples: NDArray[np
 
 def test_a_mosaic_has_whole_tiles(samples: NDArray[np.uint8], tmp_path: Path) -> None:
     path = write(tmp_path / "a.png", side_by_side(samples)[:-1])
-    with pytest.raises(InputError, match=r"9×12 pixels .*are no whole number of tiles, 2×3"):
+    with pytest.raises(InputError, match=r"9×12 pixels .*are not a multiple of 2×3 tiles"):
         read_container(path, views=(2, 3), layout="mosaic")
     with pytest.raises(InputError, match="layout is 'eslf' or 'mosaic', not 'tiles'"):
         read_container(path, views=(2, 3), layout="tiles")
@@ -214,7 +214,7 @@ def test_jpeg_pleno_views_of_ten_bits(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"P3\n1 1\n255\n0 0 0\n", "no binary Netpbm"),
+        (b"P3\n1 1\n255\n0 0 0\n", "not a binary Netpbm"),
         (b"P6\n2 1\n255\nabc", "truncated: 2×1 pixels are 6 bytes, and it has 3"),
         (b"P5\n1 1\n1023\n\xff\xff", "holds 65535, and states that nothing is above 1023"),
         (b"P5\n0 1\n255\n", "states 0×1 pixels"),

@@ -154,7 +154,7 @@ def test_what_is_assumed_is_said(views: Views, folder_of: Write) -> None:
     assert said[0].filename == __file__
     assert field.frame.linear[0, 0] == 1e-3
     assert field.disparity_of(64 * 1e-3) == pytest.approx(1)  # spacing × 64 pixels
-    with pytest.warns(ResultWarning, match="do not state slope_per_pixel; taken"):
+    with pytest.warns(ResultWarning, match="do not state slope_per_pixel; assumed"):
         open_light_field(folder, spacing=(3e-3, 2e-3), focus_distance=1.0)
     field = open_light_field(folder, spacing=(3e-3, 2e-3), slope_per_pixel=1e-3, focus_distance=2.0)
     expected = LightField.from_views(field.values, (3e-3, 2e-3), 1e-3, 2.0)
@@ -419,7 +419,7 @@ def refused(message: str) -> Iterator[None]:
         ("a.png", ".", r"holds 1 files, for instance a\.png"),
         ("a.png", "a.png", r"a\.png cannot be read as a picture"),
         ("zarr.json", ".", r"is a store, .*vcc\.store\.open_store"),
-        ("a.txt", "a.txt", r"a\.txt is a file in no format that is known"),
+        ("a.txt", "a.txt", r"a\.txt is not a file in a supported format"),
     ],
 )
 def test_no_light_field(there: str | None, path: str, message: str, tmp_path: Path) -> None:

@@ -80,11 +80,11 @@ def test_folders_say_what_samples_are(tmp_path, sample):
 
 
 def test_what_cannot_say_that_samples_are_points_warns(tmp_path):
-    with pytest.warns(ResultWarning, match=r"a.png: .* values at points, and they are read back as means"):
+    with pytest.warns(ResultWarning, match=r"a.png: .* values at points, so they are read as means"):
         save_light_field(field_of(sample="point"), tmp_path / "a.png")
     oblong = field_of(sample="point", spacing=(1e-3, 2e-3))
     with pytest.warns(
-        ResultWarning, match=r"cannot hold its cameras.* values at points, and they are read back as means"
+        ResultWarning, match=r"cannot hold its cameras.* values at points, so they are read as means"
     ):
         save_light_field(oblong, tmp_path / "views", kind="views")
 
@@ -326,15 +326,15 @@ def test_a_lens_makes_cameras_converge(tmp_path):
     [
         ("a.jpg", {}, r"end the name in \.zarr, \.mat, \.png, \.mp4, \.npz, or in nothing"),
         ("a", {"kind": "jpeg"}, "kind is one of"),
-        ("a", {"kind": "mat"}, r"end its name in \.mat"),
+        ("a", {"kind": "mat"}, r"end it in \.mat"),
         ("a", {"bits": 12}, "8 or 16 bits"),
         ("a", {"transfer": "gamma"}, "transfer is"),
         ("a", {"exposure": 0}, "exposure is"),
         ("a", {"ending": ".exr"}, r'kind "hci" end in \.png'),
         ("a", {"kind": "views", "ending": ".jpg"}, r"\.png or \.tif or \.exr"),
-        ("a", {"kind": "views", "ending": ".exr", "exposure": 2}, "no place in .exr"),
-        ("a", {"codec": "x"}, 'codec= means nothing to the format "hci", which takes bits, ending'),
-        ("a.npz", {"bits": 8}, 'bits= means nothing to the format "npz", which takes no options'),
+        ("a", {"kind": "views", "ending": ".exr", "exposure": 2}, "not supported for .exr"),
+        ("a", {"codec": "x"}, 'codec= is not supported by the format "hci", which takes bits, ending'),
+        ("a.npz", {"bits": 8}, 'bits= is not supported by the format "npz", which takes no options'),
         ("lost/a", {}, "there is no folder"),
     ],
 )

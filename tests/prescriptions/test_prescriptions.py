@@ -289,7 +289,7 @@ def test_a_conic_of_zero_is_a_sphere(file):
     ("old", "new", "message"),
     [
         ("UNIT MM", "UNIT FT", r"unit of length FT is not known; known are MM"),
-        ("UNIT MM X W X CM MR CPMM", "", r"does not say its unit"),
+        ("UNIT MM X W X CM MR CPMM", "", r"does not state its unit"),
         ("MODE SEQ", "MODE NSC", r"mode NSC: only sequential"),
         ("CURV 0.025", "CURV x", r'surface 2, line \d+: "CURV x 0 0 0 0 ""'),
         ("DISZ 5.0", "DISZ", r'surface 3, line \d+: "DISZ " should have a number'),

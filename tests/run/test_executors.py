@@ -377,5 +377,5 @@ def test_a_store_that_is_not_there_or_another_is_told(tmp_path):
     with pytest.raises(vcc.InputError, match=r"holds another light field than the one that was opened"):
         pickle.loads(packed)
     (tmp_path / "a.zarr").rename(tmp_path / "b.zarr")
-    with pytest.raises(vcc.InputError, match=r"the store is not found on .* read it under one path"):
+    with pytest.raises(vcc.InputError, match=r"the store is not found on .* All processes must use the same path"):
         pickle.loads(packed)

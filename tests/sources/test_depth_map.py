@@ -194,7 +194,7 @@ def test_from_disparity_is_the_formula():
     assert np.allclose(one.render(camera), two.render(camera), atol=1e-5)
     sky = np.full(ARRAY.pixels, ARRAY.disparity(math.inf))
     DepthMapScene.from_disparity(picture, sky, ARRAY).render(camera)
-    with pytest.raises(InputError, match=r"infinitely far things have -3\.33333"):
+    with pytest.raises(InputError, match=r"infinitely far points have -3\.33333"):
         DepthMapScene.from_disparity(picture, sky - 1, ARRAY)
 
 
@@ -242,7 +242,7 @@ def test_what_cannot_be_is_refused(radiance, depth, options, words):
 
 def test_views_that_look_past_the_picture_are_refused():
     scene = DepthMapScene(PLAIN, FLAT, 1e-3, reach=0.01)
-    with pytest.raises(InputError, match=r"view \(0, 0\) is 0.05 m from the middle.*reach=0.05"):
+    with pytest.raises(InputError, match=r"view \(0, 0\) is 0.05 m from the centre.*reach=0.05"):
         scene.render(CameraArray((1, 3), (20, 30), 0.05).camera(0, 0))
     with pytest.raises(InputError, match="to a side, and the picture"):
         scene.render(CameraArray((1, 1), (20, 300), 0.05).camera(0, 0))

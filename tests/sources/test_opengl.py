@@ -263,7 +263,7 @@ def test_files_that_cannot_be_drawn_are_refused(tmp_path, name, content, words):
         (lambda: OpenGLRenderer(TARGET, multisampling=2.5), "multisampling"),
         (lambda: OpenGLRenderer(TARGET, background=(0, -1, 0)), "background"),
         (lambda: Viewpoint((1, 1, 1), (1, 1, 1)), "both are"),
-        (lambda: Viewpoint(up=(0, 0, 2)), "along the view"),
+        (lambda: Viewpoint(up=(0, 0, 2)), "parallel to the viewing direction"),
         (lambda: Viewpoint(unit=0), "unit"),
         (lambda: Lighting(sun=(1, -1, 0)), "sun is light"),
     ],

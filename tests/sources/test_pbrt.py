@@ -159,7 +159,7 @@ def test_included_files_stand_in_their_place(tmp_path):
         ('Include "none.pbrt"\nCamera "perspective"\n', r"includes none\.pbrt, and .* is not there"),
         ('Include "scene.pbrt"\nCamera "perspective"\n', "includes itself"),
         ('CoordSysTransform "x"\nCamera "perspective"\n', "not there yet"),
-        ('"perspective" Camera\n', "stands where a directive should"),
+        ('"perspective" Camera\n', "is not a directive"),
     ],
 )
 def test_scenes_that_cannot_be_wrapped(tmp_path, head, message):

@@ -159,10 +159,10 @@ class Wrong(Numbers):
 @pytest.mark.parametrize(
     ("picture", "message"),
     [
-        (np.zeros((5, 4, 3), np.float32), r"shape \(5, 4, 3\), and \(4, 5, 3\) was asked for"),
+        (np.zeros((5, 4, 3), np.float32), r"shape \(5, 4, 3\), and \(4, 5, 3\) was requested"),
         (np.zeros((4, 5, 3), np.uint8), "came as uint8"),
-        (np.full((4, 5, 3), np.nan, np.float32), "60 values that are no radiance"),
-        (np.full((4, 5, 3), -1e-3, np.float32), "60 values that are no radiance"),
+        (np.full((4, 5, 3), np.nan, np.float32), "60 values that are not valid radiance"),
+        (np.full((4, 5, 3), -1e-3, np.float32), "60 values that are not valid radiance"),
         (np.full((4, 5, 3), 7e4, np.float32), 'float16 ends at 65504: take dtype="float32"'),
     ],
 )

@@ -178,4 +178,4 @@ def test_the_order_of_numbered_views_can_be_told(codes, tmp_path):
     assert np.array_equal(stored_codes("told.zarr"), codes)
     assert "9 of 16 numbered views" in refused("convert", "numbered", "other.zarr", *KNOWN, "--views", "4", "4")
     assert "leave out --order" in refused("convert", "told.zarr", "again.zarr", "--order", "serpentine")
-    assert "--every means nothing to a folder" in refused("convert", "views", "v.zarr", *KNOWN, "--every", "2")
+    assert "--every is not supported for a folder" in refused("convert", "views", "v.zarr", *KNOWN, "--every", "2")

@@ -471,7 +471,7 @@ def test_settings_of_compression_are_checked(packing, options, words):
 
 
 def test_a_store_is_replaced_only_when_asked_and_only_by_a_whole_one(tmp_path, stored):
-    with pytest.raises(vcc.InputError, match="is there already"):
+    with pytest.raises(vcc.InputError, match="exists already"):
         save_store(light_field(seed=1), stored.path)
     bad = light_field().values.astype(np.float64)  # refused as it is written
     with pytest.raises(vcc.InputError):
@@ -480,7 +480,7 @@ def test_a_store_is_replaced_only_when_asked_and_only_by_a_whole_one(tmp_path, s
     new = save_store(light_field(seed=1), stored.path, overwrite=True)
     np.testing.assert_array_equal(new.read().values, light_field(seed=1).values)
     (tmp_path / "notes").mkdir()
-    with pytest.raises(vcc.InputError, match="is no store"):
+    with pytest.raises(vcc.InputError, match="is not a store"):
         save_store(light_field(), tmp_path / "notes", overwrite=True)
     assert sorted(file.name for file in tmp_path.iterdir()) == ["a.zarr", "notes"]
 
@@ -624,7 +624,7 @@ def test_wrong_metadata_is_named(stored, file, keys, words):
         (lambda path: None, "there is no store"),
         (lambda path: path.write_text(""), "it is a file"),
         (lambda path: path.mkdir(), r"holds no zarr\.json"),
-        (zarr.create_group, "and no light field"),
+        (zarr.create_group, "but not a light field"),
         (lambda path: zarr.create_group(path, zarr_format=2), "is Zarr version 2"),
     ],
 )
@@ -639,7 +639,9 @@ def test_any_group_is_a_store_to_speak_of(tmp_path):
     assert is_store(tmp_path / "other.zarr")
 
 
-@pytest.mark.parametrize(("place", "words"), [("file.zarr", "is no store"), ("lost/a.zarr", "there is no folder")])
+@pytest.mark.parametrize(
+    ("place", "words"), [("file.zarr", "is not a store"), ("lost/a.zarr", "there is no folder")]
+)
 def test_stores_that_cannot_be_made_are_refused(tmp_path, place, words):
     (tmp_path / "file.zarr").write_text("")
     with pytest.raises(vcc.InputError, match=words):
@@ -667,7 +669,7 @@ def test_a_store_whose_writer_died_between_two_renames_is_put_back_where_it_is_l
     for look in (open_store, is_store, lambda path: save_store(lf, path, overwrite=True)):
         save_store(lf, path, overwrite=True)
         path.rename(parts.set_aside(path))
-        with pytest.warns(vcc.ResultWarning, match="what stood there before is back"):
+        with pytest.warns(vcc.ResultWarning, match="the old store was restored"):
             assert look(path)
         np.testing.assert_array_equal(open_store(path).read().values, lf.values)
         assert [file.name for file in tmp_path.iterdir()] == ["a.zarr"]
@@ -757,7 +759,7 @@ def test_threads_that_save_one_store_do_so_one_after_the_other(tmp_path, overwri
         thread.start()
     for thread in threads:
         thread.join()
-    there = f"{tmp_path / 'a.zarr'} is there already: choose another name, or pass overwrite=True"
+    there = f"{tmp_path / 'a.zarr'} exists already: choose another name, or pass overwrite=True"
     assert told == ([True] * 4 if overwrite else [True, there, there, there])
     found = open_store(tmp_path / "a.zarr").read().values
     assert any(np.array_equal(found, light_field(seed=seed).values) for seed in range(4))

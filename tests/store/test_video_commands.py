@@ -162,7 +162,7 @@ def test_what_is_assumed_of_all_frames_is_said_once(frames):
         (lambda: None, "--overwrite", "leave out --kind and --overwrite"),
         (lambda: run("convert", "take", "take.zarr", "--frame-rate", 30, *KNOWN), "", "frame_rate is 30.0 there"),
         (lambda: create_video("take.zarr"), "", "a video of other frames: converted_from is None there"),
-        (lambda: Path("take.zarr").mkdir() or Path("take.zarr/x").write_text(""), "", "is no video"),
+        (lambda: Path("take.zarr").mkdir() or Path("take.zarr/x").write_text(""), "", "is not a video"),
         (lambda: [shutil.rmtree(each) for each in Path("take").glob("f*")], "", "take holds nothing numbered"),
     ],
 )  # fmt: skip

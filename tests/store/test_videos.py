@@ -517,9 +517,9 @@ def test_what_is_no_video_and_a_video_for_one_light_field_are_told_apart(tmp_pat
     assert (is_video(video.path), is_video(tmp_path / "b.zarr"), is_video(tmp_path)) == (True, False, False)
     with pytest.raises(vcc.InputError, match=r"one of its frames, .*a\.zarr.000000_0\.0 \(0 s\) to 000002_0\.2 "):
         open_store(video.path)
-    with pytest.raises(vcc.InputError, match=r"is no video of light fields: vcc\.store\.open_store opens"):
+    with pytest.raises(vcc.InputError, match=r"is not a video of light fields: vcc\.store\.open_store opens"):
         open_video(tmp_path / "b.zarr")
-    with pytest.raises(vcc.InputError, match="is there already, and is no video"):
+    with pytest.raises(vcc.InputError, match="exists already, and is not a video"):
         create_video(tmp_path / "b.zarr")
     with pytest.raises(vcc.InputError, match=r"holds no zarr\.json"):
         open_video(tmp_path)

@@ -167,7 +167,7 @@ def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int)
     """Raise for values that no camera has: numbers that overflow in computation, lists nested too deeply."""
     if not levels:
         raise InputError(
-            f"{place[:LONGEST_SHOWN]}… is made of lists in lists: a camera's stand in up to {DEEPEST} others"
+            f"{place[:LONGEST_SHOWN]}… is nested too deeply: lists and tables have up to {DEEPEST} levels"
         )
     for key, each in enumerate(given, start=1) if isinstance(given, list) else given.items():
         if isinstance(each, dict | list):
@@ -199,9 +199,9 @@ def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -
 def _train_of(tables: Mapping[str, Any], called: str, beside: Beside, name: str) -> TrainAsWritten:
     if MOVING in tables:
         raise InputError(
-            f"{called} has a table [{MOVING}], so that the camera changes over time, which cannot be had here: "
-            "vcc.motion.load_moving_camera reads it, and vcc capture takes it with --exposure-time. Without "
-            f"[{MOVING}] it is the camera at rest"
+            f"{called} has a table [{MOVING}], which describes a time-varying camera and is not supported here. "
+            "Load it with vcc.motion.load_moving_camera, or run vcc capture with --exposure-time. Without "
+            f"[{MOVING}] the file describes the camera at rest"
         )
     check_keys(tables, {"elements", "sensor"}, {"sensor"}, called, "table")
     elements = tables.get("elements", [])
@@ -223,9 +223,7 @@ def _focus(given: dict[str, Any], place: str) -> float | None:
     """Remove the focus distance from a sensor's fields, set z to 0 and return the distance; None if z is given."""
     if "focus" not in given:
         if "z" not in given:
-            raise InputError(
-                f'{place} has no field "z" (or "focus", the distance that is to be sharp), which it needs'
-            )
+            raise InputError(f'{place} has no field "z" (or "focus", the distance in focus), which it needs')
         return None
     if "z" in given:
         raise InputError(f"{place} has a z and a focus, of which z would follow: leave one out")
@@ -471,7 +469,7 @@ def _read_affine(given: Any, what: str, beside: Beside) -> Affine:
 
 
 def read_array(given: Any, unit: str | None, transmission: bool, what: str, beside: Beside) -> NDArray[np.float64]:
-    """An array from a file next to the camera file, or from nested lists; numbers with a unit carry it each."""
+    """An array from a file next to the camera file, or from nested lists; each number states its unit, if any."""
     if isinstance(given, str):
         if given in beside.arrays:
             return beside.arrays[given]

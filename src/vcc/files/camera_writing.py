@@ -104,7 +104,7 @@ def _write_element(
             form = FROM_FILES[kind].of(element, file.parent) if kind in FROM_FILES else None
             return {"kind": name, **writer.table_of(form or element)}
     raise InputError(
-        f"{element.label} cannot be written to {file.name}: a camera file knows "
+        f"{element.label} cannot be written to {file.name}: camera files support "
         f"{listed(ELEMENT_KINDS)}. Add its class to vcc.camera_file.ELEMENT_KINDS, "
         "in the program that reads the file too"
     )
@@ -218,7 +218,7 @@ class Writer(Brief):
         function = getattr(thing, "function", thing)
         if isinstance(function, family.base):
             said = (
-                f"a {type(thing).__name__}, which is none that a camera file knows ({known}). Add the class to "
+                f"a {type(thing).__name__}, which camera files do not support ({known}). Add the class to "
                 f"vcc.camera_file.{family.table}, in the program that reads the file too,"
             )
         else:

@@ -35,9 +35,9 @@ def check_declared_size(claimed: int, stored: int, what: str, most: int = PICTUR
     allowed = most if stored <= SMALL_FILE else max(most, TIMES_PACKED * stored)
     if claimed > allowed:
         raise InputError(
-            f"{what} claims {_count(claimed)} bytes of samples in {stored:,} bytes, and so few may unpack to "
-            f"{allowed:,}. Copy it again from where it came from; if it is sound, save it less packed, "
-            "as .npy for instance"
+            f"{what} claims {_count(claimed)} bytes of samples in {stored:,} bytes; files of this size may unpack "
+            f"to {allowed:,}. Copy it again from where it came from; if it is valid, save it with less "
+            "compression, for instance as .npy"
         )
 
 

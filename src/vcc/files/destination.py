@@ -53,7 +53,7 @@ class Destination:
             ending = checks.ending(what, path, *endings)
             if asked not in (None, ending):
                 raise InputError(
-                    f'format="{format}" does not go with {path.name}, whose ending says the format: leave it out, '
+                    f'format="{format}" contradicts the ending of {path.name}: leave format out, '
                     "or give the file another ending"
                 )
             return cls(ending, path=path)
@@ -66,11 +66,9 @@ class Destination:
             raise InputError(f'{what} is bytes, and this buffer takes text: use io.BytesIO(), or open(…, "wb")')
         formats = ", ".join(each[1:] for each in endings)
         if asked is None:
-            raise InputError(
-                f"a buffer has no ending that says in which format {what} goes there: add format=, {formats}"
-            )
+            raise InputError(f"a buffer has no ending that selects the format of {what}: add format=, {formats}")
         if asked not in endings:
-            raise InputError(f'{what} cannot be written as format="{format}": there are {formats}')
+            raise InputError(f'{what} cannot be written as format="{format}": supported are {formats}')
         return cls(asked, buffer=target)
 
     @property

@@ -203,14 +203,14 @@ def parsed(text: str) -> ImageMetadata | None:
         if not isinstance(said[KEY], int) or said[KEY] < 1:
             raise ValueError(f"version {said[KEY]!r}")
         if said[KEY] > _VERSION:
-            raise InputError(f"it says what its numbers are in form {said[KEY]} of a newer vcc: read it with that")
+            raise InputError(f"its metadata have version {said[KEY]}, of a newer vcc: read it with that version")
         return _metadata(said)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, InputError) as error:
         if isinstance(error, InputError) and "newer vcc" in str(error):
             raise
         why = shown(f"{type(error).__name__}: {error}", 200)
         raise InputError(
-            f"what it says of its numbers is damaged ({why}): write it anew, or remove its description"
+            f"its metadata are damaged ({why}): write the file again, or remove its description"
         ) from None
 
 
@@ -243,14 +243,14 @@ def _one_of(value: Any, choices: Any) -> Any:
 
 def _above_zero(value: Any) -> float:
     if not _between(value, 0, math.inf) > 0:
-        raise ValueError(f"{value!r} is no number above 0")
+        raise ValueError(f"{value!r} is not a number above 0")
     return float(value)
 
 
 def _between(value: Any, low: float, high: float) -> float:
     number = float(value)
     if not (low <= number <= high and math.isfinite(number)):
-        raise ValueError(f"{value!r} is no number from {low:g} to {high:g}")
+        raise ValueError(f"{value!r} is not a number from {low:g} to {high:g}")
     return number
 
 

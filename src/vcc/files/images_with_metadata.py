@@ -54,8 +54,8 @@ def unknown(picture: ImageWithMetadata) -> str:
     """Text, without a full stop, for a picture without valid metadata."""
     if picture.changed:
         return (
-            f"{picture.path} holds other numbers than those that it was written with: another program has changed "
-            "them, and what it says of them holds no more"
+            f"{picture.path} has metadata that do not match its numbers: another program has changed "
+            "the numbers and kept the metadata"
         )
     return f"{picture.path} does not say what its numbers are"
 
@@ -87,7 +87,7 @@ def light_of(picture: ImageWithMetadata) -> NDArray[np.float32]:
         return _irradiance(picture, said.recording)
     if said.transfer == "srgb":
         if samples.dtype.kind != "u":
-            raise InputError(f"{picture.path} says that its numbers are sRGB, and holds floating point")
+            raise InputError(f"{picture.path} states that its numbers are sRGB, but they are floating point")
         light = transfer.decode(samples)
     else:
         light = (samples / said.full_scale).astype(np.float32, copy=False)
@@ -100,7 +100,7 @@ def _irradiance(picture: ImageWithMetadata, raw: RawNumbers) -> NDArray[np.float
     scale = np.array(raw.dn_per_irradiance, dtype=np.float32)
     if raw.color_filter is None:
         if len(scale) != channels:
-            raise InputError(f"{picture.path} has {channels} channels, and says how {len(scale)} were recorded")
+            raise InputError(f"{picture.path} has {channels} channels, but its metadata describe {len(scale)}")
         return np.asarray(light / (scale if light.ndim == 3 else scale[0]), dtype=np.float32)
     tile = Electronics(color_filter=raw.color_filter)
     if light.ndim != 2 or len(scale) != tile.filter_channels:
@@ -129,7 +129,7 @@ def light_in(path: Path, told: Literal["auto", "srgb", "linear"]) -> NDArray[np.
         linear = picture.samples.astype(np.float32) / np.float32(full)
         return linear if told == "linear" else transfer.decode(picture.samples)
     if said.recording is not None:
-        raise InputError(f"{path} says that it holds {said.in_words}: save a picture of it, demosaiced")
+        raise InputError(f"{path} states that it holds {said.in_words}: save a demosaiced picture of it")
     check_agrees(path, said, told)
     light = light_of(picture)
     return light if said.upright else light[::-1, ::-1]
@@ -156,5 +156,5 @@ def check_usual(path: Path) -> None:
     if said is not None and (not said.is_neutral or (whole and said.transfer != "srgb")):
         raise InputError(
             f"{path} says that its numbers are {said.in_words}, and this format's are sRGB, upright and not "
-            "exposed: write it anew with exposure=1"
+            "exposed: write it again with exposure=1"
         )

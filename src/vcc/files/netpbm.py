@@ -31,7 +31,7 @@ def read_netpbm(path: Path) -> NDArray[Any]:
     data = path.read_bytes()
     match = _HEADER.match(data)
     if match is None:
-        raise InputError("this is no binary Netpbm picture (P5 or P6)")
+        raise InputError("this is not a binary Netpbm picture (P5 or P6)")
     width, height, largest = (int(match[n]) for n in (2, 3, 4))
     channels = 3 if match[1] == b"6" else 1
     if not 0 < largest < 65536 or width * height == 0:

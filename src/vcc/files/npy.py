@@ -18,7 +18,7 @@ def write_npy(values: NDArray[Any], stream: IO[bytes]) -> None:
     """Write an array like ``numpy.save``, whose error for a full disk gives only the number of elements written.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     values = np.asarray(values, order="C")
     np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(values))

@@ -120,7 +120,7 @@ def settle(folder: Path) -> None:
     """Flush a folder and its content to the disk, so that a later rename survives a power cut.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     for root, _, names in os.walk(folder):
         for name in names:
@@ -132,7 +132,7 @@ def settle_names(folder: Path) -> None:
     """Flush the names in a folder to the disk.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     if os.name == "posix":  # elsewhere folders cannot be opened
         _settle(folder, os.O_RDONLY)
@@ -159,7 +159,7 @@ def put_in_place(part: Path, target: Path, replace: bool) -> None:
         replace: whether to replace an existing folder; if False, one that is not empty raises.
 
     Raises:
-        OSError: the disk refuses. Existing content stays in place.
+        OSError: the write fails. Existing content stays in place.
     """
     if not (replace and target.exists()):
         part.rename(target)
@@ -202,7 +202,7 @@ def put_back(target: Path) -> bool:
         Whether content was restored.
 
     Raises:
-        OSError: the old content exists and the disk refuses.
+        OSError: the old content exists and cannot be renamed.
     """
     if os.path.lexists(target) or not target.parent.is_dir():
         return False

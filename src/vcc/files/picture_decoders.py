@@ -21,8 +21,7 @@ from vcc.files.netpbm import read_netpbm
 from vcc.files.npy import read_npy
 
 NOT_OPAQUE = (
-    "this picture is not opaque everywhere, and what lies behind it is not known: "
-    "flatten it (remove its alpha channel)"
+    "this picture is not opaque everywhere, and its background is unknown: flatten it (remove its alpha channel)"
 )
 
 _PNG = b"\x89PNG\r\n\x1a\n"
@@ -93,7 +92,7 @@ def _check_png(data: bytes) -> None:
         if name == b"IEND":
             return
         place += 12 + length
-    raise ValueError("it is no PNG, or its end is missing")
+    raise ValueError("it is not a PNG, or its end is missing")
 
 
 def _read_jpeg(path: Path) -> NDArray[Any]:
@@ -134,7 +133,7 @@ def _read_tiff(path: Path) -> NDArray[Any]:
 
     with tifffile.TiffFile(path) as file:
         if len(file.pages) != 1:
-            raise Unsuitable(f"this TIFF holds {len(file.pages)} pictures; one is wanted")
+            raise Unsuitable(f"this TIFF holds {len(file.pages)} pictures; only one is supported")
         page = file.pages.first
         _check_tiff(page, path)
         samples: NDArray[Any] = page.asarray()
@@ -183,7 +182,7 @@ def _read_bmp(path: Path) -> NDArray[Any]:
     with Image.open(io.BytesIO(data), formats=("BMP",)) as picture:
         check_declared_size(3 * picture.width * picture.height, len(data), "it")
         if picture.info["compression"] not in _PLAIN_BMP:
-            raise Unsuitable("this BMP is packed, which few programs do; save it as PNG")
+            raise Unsuitable("this BMP is compressed, which is not supported; save it as PNG")
         if picture.mode == "P":
             palette: Any = picture.palette  # colours as stored in the file
             colours = len(palette.palette) // len(palette.rawmode)

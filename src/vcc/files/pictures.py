@@ -144,7 +144,7 @@ def refuse_coded(path: Path, wanted: str) -> None:
     said = metadata_of(path)
     if said is not None and (said.transfer == "srgb" or not said.is_neutral):
         raise InputError(
-            f"{path} says that its numbers are {said.in_words}: {wanted}, so this is another picture. Write the "
+            f"{path} states that its numbers are {said.in_words}, but {wanted}. Write the "
             "numbers themselves, with numpy.save or as .exr"
         )
 
@@ -309,7 +309,7 @@ def _save_linear(
     ending = place.ending
     if exposure not in ("auto", 1):
         raise InputError(
-            f"exposure={exposure} has no place in {place.words}: {ending} files hold the values untouched. "
+            f"exposure={exposure} is not supported for {place.words}: {ending} files hold the values unchanged. "
             "Leave it out, or write a .png or .tif"
         )
     if bits not in (None, 32):

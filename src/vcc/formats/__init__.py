@@ -1,4 +1,4 @@
-"""Light fields and pictures in files. `open_light_field` finds out which format a folder or file has."""
+"""Light fields and pictures in files. `open_light_field` detects the format of a folder or file."""
 
 from vcc.formats.containers import read_container
 from vcc.formats.folder_info import FolderInfo

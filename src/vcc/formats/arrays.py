@@ -1,9 +1,10 @@
-"""Light fields as plain arrays, NumPy's ``.npy`` and ``.npz``; and an ``.npz`` of our own, which keeps everything.
+"""Light fields as NumPy arrays, ``.npy`` and ``.npz``, including a complete ``.npz`` format of this package.
 
-An ``.npy`` holds samples and nothing else, so their axes may have to be told and the cameras are unknown.
-The ``.npz`` that `save` makes holds, beside ``values`` (v, u, t, s[, channel]), the 5×5 ``frame`` (indices
-from 0 to metres and slopes), ``transfer`` ("linear" or "srgb"), ``sample`` ("mean" or "point") and, where known,
-``disparity_range``. Other programs may write the same; without ``sample`` the samples are means over pixels.
+An ``.npy`` contains samples only, so their axes may have to be specified and the cameras are unknown. The
+``.npz`` that `save` writes contains ``values`` (v, u, t, s[, channel]), the 5×5 ``frame`` (indices from 0 to
+metres and slopes), ``transfer`` ("linear" or "srgb"), ``sample`` ("mean" or "point") and, if known,
+``disparity_range``. Other programs may write the same format; without ``sample`` the samples are means over
+pixels.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from vcc.formats.grid import Decoded, Geometry
 ENDINGS = (".npy", ".npz")
 
 _OWN = ("values", "frame", "transfer", "sample", "disparity_range")
-_MOST_LIKELY_CHANNELS = 4  # an axis of so few samples is colour rather than a picture's width
+_MOST_LIKELY_CHANNELS = 4  # an axis this short is colour rather than the width of a picture
 _ORDER = "vutsc"
 _AGAIN = "Copy it again from where it came from"
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is meant to be such a file, by its ending."""
+    """Whether the path is such a file, by its extension."""
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
@@ -48,25 +49,25 @@ def read(
     axes: str | None = None,
     key: str | None = None,
 ) -> Decoded:
-    """The light field in an array.
+    """Read the light field in an array.
 
     Args:
         path: an ``.npy`` or ``.npz`` file.
-        shape: how to divide the array: as many sizes as it has axes; or two, (rows, columns) of views, where its
-            first axis counts the views row by row.
-        axes: what the axes of the (divided) array are, a letter each: "vutsc" are rows of views, columns of
-            views, rows of pixels, columns of pixels, channels. Without it an array of four axes is taken as
-            "vuts", of five as "vutsc".
-        key: which array of an ``.npz``; needed where there are several and none is called "values".
+        shape: shape to which the array is reshaped: all sizes; or (rows, columns) of views if the first axis
+            counts the views row by row.
+        axes: meaning of the axes of the (reshaped) array, a letter each: "vutsc" are rows of views, columns of
+            views, rows of pixels, columns of pixels, channels. The default is "vuts" for four axes, "vutsc" for
+            five.
+        key: name of the array in an ``.npz``; required if there are several and none is called "values".
 
     Returns:
-        Samples as stored. Those of an ``.npz`` that states its transfer have that; else floating-point ones
-        are "linear" and unsigned integers "srgb".
+        Samples as stored, with the transfer that the ``.npz`` states; else floating-point samples are "linear"
+        and unsigned integers "srgb".
 
     Raises:
-        InputError: a truncated or damaged file, one of Python objects, several arrays and no key, a shape or axes
-            that do not fit the array, samples of another type, or entries of an ``.npz`` of ours that cannot be
-            understood.
+        InputError: a truncated or damaged file, an array of Python objects, several arrays and no key, a shape
+            or axes that do not fit the array, samples of another type, or invalid entries in an ``.npz`` of
+            this package.
     """
     path = Path(path)
     arrays = _arrays(path, key)
@@ -89,14 +90,14 @@ def read(
 
 
 def save(light_field: Samples, path: str | PathLike[str]) -> Path:
-    """Write a light field as an ``.npz`` that keeps it whole: samples of any type, any frame. Nothing is lost.
+    """Write a light field as a complete, lossless ``.npz``: samples of any type, any frame.
 
     Args:
-        light_field: in memory, its values of any array library, or in a store.
-        path: where to; the name ends in ``.npz``.
+        light_field: a light field in memory, from any array library, or in a store.
+        path: path to write to; ends in ``.npz``.
 
     Raises:
-        InputError: another ending, or a place that cannot be written to.
+        InputError: another extension, or a path that is not writable.
     """
     path = Path(path).expanduser()
     checks.ending("a light field as arrays", path, ".npz")
@@ -115,11 +116,11 @@ def save(light_field: Samples, path: str | PathLike[str]) -> Path:
 
 
 def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
-    """The arrays that matter, the samples under the name of "values"."""
+    """Read the relevant arrays, with the samples under the name "values"."""
     try:
         if path.suffix.lower() == ".npy":
             if key is not None:
-                raise InputError(f"{path} holds one array without a name, so key={key!r} means nothing")
+                raise InputError(f"{path} holds one array without a name: leave key={key!r} out")
             return {"values": read_npy(path)}
         with path.open("rb") as file:
             loaded = np.load(file, allow_pickle=False, mmap_mode="r")
@@ -150,19 +151,19 @@ def _arrays(path: Path, key: str | None) -> dict[str, NDArray[Any]]:
 
 
 def _check_unpacked(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
-    """Refuse arrays that unpack to more than so few bytes may hold."""
+    """Raise if the arrays decompress to more than the file's size allows."""
     members = [] if loaded.zip is None else loaded.zip.infolist()
     check_declared_size(sum(member.file_size for member in members), path.stat().st_size, str(path), LIGHT_FIELD)
 
 
 _MEMBER, _HEAD = b"PK\3\4", 30
-"""How a member of an archive begins: a head of so many bytes, then its name."""
+"""Signature of an archive member, and the length of its header in bytes; the name follows."""
 
 
 def _check_directory(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
-    """Refuse an archive whose directory lists fewer members than there are, or gives one another name.
+    """Raise if an archive's directory omits members or gives one another name.
 
-    What is not listed (a frame) would be taken as not stated.
+    An unlisted member (such as the frame) would count as not stated.
     """
     archive = loaded.zip
     if archive is None:
@@ -184,7 +185,7 @@ def _check_directory(loaded: np.lib.npyio.NpzFile, path: Path) -> None:
 
 
 def _check_gap(file: IO[bytes], first: int, stop: int, path: Path) -> None:
-    """Refuse a member in a part of an archive that no member is said to be in."""
+    """Raise if a gap between the listed members of an archive contains another member."""
     file.seek(first)
     if _MEMBER in file.read(max(stop - first, 0)):
         raise InputError(f"{path} is damaged: its directory leaves out members that are there. {_AGAIN}")
@@ -211,7 +212,7 @@ def _divided(values: NDArray[Any], shape: tuple[int, ...] | None, path: Path) ->
 
 
 def _ordered(values: NDArray[Any], axes: str | None, path: Path) -> NDArray[Any]:
-    """The array with its axes in the order (v, u, t, s[, channel])."""
+    """Transpose the array to the axes (v, u, t, s[, channel])."""
     if axes is None:
         if values.ndim not in (4, 5):
             raise InputError(

@@ -19,16 +19,16 @@ _LINE = re.compile(r"\s*(num_x|num_y|base_x|base_y)\s*[:=]?\s*(\S+)\s*")
 
 @dataclass(frozen=True)
 class Parameters:
-    """What ``param.txt`` states.
+    """Content of ``param.txt``.
 
-    Camera t of T in a row stands base_x·(2t/(T − 1) − 1) to the left of the middle, and rows go upwards alike:
-    base is half the width of all cameras together. Source: CamPoses in util.py of
-    gfxdisp/Blender-addon-light-field-camera, alike in all its versions; its README calls base the distance
-    between neighbours, which it is for 3 views only.
+    Camera t of T in a row is base_x·(2t/(T − 1) − 1) to the left of the centre, and rows go upwards likewise:
+    base is half the extent of all cameras. Source: CamPoses in util.py of
+    gfxdisp/Blender-addon-light-field-camera, equal in all versions; its README describes base as the distance
+    between neighbours, which is true for 3 views only.
 
     Args:
         views: (rows, columns) of views.
-        base: (base_y, base_x), in Blender's unit, the metre.
+        base: (base_y, base_x), in Blender's unit, metres.
     """
 
     views: tuple[int, int]
@@ -36,8 +36,8 @@ class Parameters:
 
     @property
     def spacing(self) -> tuple[float, float] | None:
-        """Distance (dv, du) between neighbouring views, metres; a single row has that of the columns. None for one
-        view.
+        """Distance (dv, du) between neighbouring views, metres; a single row gets the value of the columns.
+        None for one view.
         """
         steps = [2 * base / (n - 1) if n > 1 else None for base, n in zip(self.base, self.views, strict=True)]
         down, right = steps[0] or steps[1], steps[1] or steps[0]
@@ -45,17 +45,17 @@ class Parameters:
 
     @property
     def geometry(self) -> Geometry:
-        """The cameras: parallel, counted from the lower right; their focal length is not stated."""
+        """The cameras: parallel, counted from the lower right; the focal length is unknown."""
         return Geometry(
             spacing=self.spacing, focus_distance=math.inf, directions=(-1, -1), directions_are_true=True
         )
 
 
 def read_parameters(folder: Path) -> Parameters | None:
-    """What ``param.txt`` states; None without such a file.
+    """Read ``param.txt``; None if there is no such file.
 
     Raises:
-        InputError: a quantity that is missing or impossible.
+        InputError: a quantity is missing or invalid.
     """
     path = folder / PARAMETERS
     if not os.path.lexists(path):
@@ -63,7 +63,7 @@ def read_parameters(folder: Path) -> Parameters | None:
     text = read_bytes(path).decode("utf-8", errors="replace")
     stated = {match[1]: match[2] for line in text.splitlines() if (match := _LINE.fullmatch(line))}
     if not stated:
-        return None  # some other file of this common name
+        return None  # another file of this common name
     values: dict[str, float] = {}
     for name in ("num_x", "num_y", "base_x", "base_y"):
         if name not in stated:

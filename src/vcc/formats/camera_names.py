@@ -1,8 +1,8 @@
-"""Names of files that state a view's row, column and position: ``NAME_RR_CC_V_U…`` of gantries and renderers.
+"""File names that state a view's row, column and position: ``NAME_RR_CC_V_U…`` of gantries and renderers.
 
-The Stanford light-field archive's gantry writes ``out_RR_CC_V_U.png`` (row, column, camera v and u). A Blender
-exporter for light-field renderers adds the camera: ``NAME_RR_CC_V_U_FOCAL_SENSOR.jpg`` (position downwards and to
-the right in mm, focal length, sensor).
+The gantry of the Stanford light field archive writes ``out_RR_CC_V_U.png`` (row, column, camera v and u). A
+Blender exporter for light field renderers adds the camera: ``NAME_RR_CC_V_U_FOCAL_SENSOR.jpg`` (position
+downwards and to the right in mm, focal length, sensor).
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from vcc.files.pictures import read_picture
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
 
 _START = r"(.+?)_(\d+)_(\d+)_(-?\d+\.\d+)_(-?\d+\.\d+)"
-"""How such names begin: a word, row, column, and the position downwards and to the right."""
+"""Start of such names: a word, row, column, and the position downwards and to the right."""
 _NUMBER = r"(\d+(?:\.\d+)?)"
 _OF_GANTRIES = re.compile(rf"{_START}_?", re.IGNORECASE)
 _WITH_CAMERA = re.compile(rf"{_START}_{_NUMBER}_{_NUMBER}")
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
-    """The grid of the pictures whose names state the camera; None if there are none.
+    """The grid of pictures whose names state the camera; None if there are none.
 
     Raises:
-        InputError: a grid that `vcc.formats.grid.arrange` refuses, or cameras that are not alike.
+        InputError: as in `vcc.formats.grid.arrange`, or cameras that differ.
     """
     return _find_named(
         folder, _WITH_CAMERA, "names with camera, focal length and sensor", read_geometry, sparse=sparse
@@ -41,11 +41,11 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
 
 
 def read_geometry(grid: ViewGrid) -> Geometry | None:
-    """The cameras that the names of a grid's files state; None if they do not.
+    """The cameras stated by the names of a grid's files; None if the names do not state any.
 
     Positions are millimetres downwards and to the right in the plane of the cameras, which are parallel. The
-    sensor is as wide as the longer side of the picture: slope per pixel = sensor / focal length / max(W, H). Reads
-    one picture, for its size.
+    sensor width belongs to the longer side of the picture: slope per pixel = sensor / focal length / max(W, H).
+    Reads one picture for its size.
 
     Raises:
         InputError: cameras of different focal lengths or sensors, or a focal length of 0.
@@ -75,19 +75,19 @@ def read_geometry(grid: ViewGrid) -> Geometry | None:
 
 
 def find_of_gantry(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
-    """The grid of the pictures that have gantry names; None if there are none.
+    """The grid of pictures with gantry names; None if there are none.
 
     Raises:
-        InputError: a grid that `vcc.formats.grid.arrange` refuses.
+        InputError: as in `vcc.formats.grid.arrange`.
     """
     return _find_named(folder, _OF_GANTRIES, "Stanford gantry names", geometry_of_gantry, sparse=sparse)
 
 
 def geometry_of_gantry(grid: ViewGrid) -> Geometry | None:
-    """The cameras that the names of a grid's files state; None if they are no gantry names.
+    """The cameras stated by the names of a grid's files; None if they are not gantry names.
 
-    The names state camera positions without a unit: their ratio is known, and they are taken as millimetres.
-    Whether they grow with row and column tells which axis to suspect if one is flipped.
+    The names state camera positions without a unit: their ratio is known, and millimetres are assumed. The sign
+    of their growth with row and column indicates the wrong axis if one is flipped.
     """
     names = _names_of(grid, _OF_GANTRIES)
     return None if names is None else replace(_stepped(names, grid.shape), spacing_unit="mm")
@@ -101,17 +101,17 @@ def _find_named(
     *,
     sparse: bool,
 ) -> ViewGrid | None:
-    """The grid of the pictures with such names; None if there are none.
+    """The grid of pictures with such names; None if there are none.
 
     Args:
-        folder: where the pictures are; others are left alone.
-        name: of a file without its ending, begins with `_START`.
-        kind: what the files follow, for people.
-        geometry_of: the cameras that the names of a grid state.
-        sparse: leave None where a view is missing, instead of refusing the grid.
+        folder: folder of the pictures; other files are ignored.
+        name: pattern of a file name without extension; begins with `_START`.
+        kind: name of the format, for people.
+        geometry_of: returns the cameras stated by the names of a grid.
+        sparse: use None for missing views instead of raising.
 
     Raises:
-        InputError: a grid that `vcc.formats.grid.arrange` refuses, or what ``geometry_of`` does.
+        InputError: as in `vcc.formats.grid.arrange` or ``geometry_of``.
     """
     matches = {file: match for file in pictures_in(folder) if (match := name.fullmatch(file.stem))}
     if not matches:
@@ -122,17 +122,17 @@ def _find_named(
 
 
 def _names_of(grid: ViewGrid, name: re.Pattern[str]) -> dict[tuple[int, int], re.Match[str]] | None:
-    """The names of a grid's files, taken apart; None if one of them is not such a name."""
+    """Match the names of a grid's files; None if one of them does not match."""
     matches = {place: name.fullmatch(file.stem) for place, file in grid.present.items()}
     found = {place: match for place, match in matches.items() if match is not None}
     return found if len(found) == len(matches) else None
 
 
 def _stepped(names: dict[tuple[int, int], re.Match[str]], shape: tuple[int, int]) -> Geometry:
-    """The spacing and the directions that positions in names state, taken as millimetres.
+    """Spacing and directions from the positions in names, in millimetres.
 
     Args:
-        names: of the views there are, from `_names_of`.
+        names: matched names of the existing views, from `_names_of`.
         shape: (rows, columns) of views.
     """
     where = np.full((*shape, 2), np.nan)
@@ -147,7 +147,7 @@ def _stepped(names: dict[tuple[int, int], re.Match[str]], shape: tuple[int, int]
 
 
 def _mean_step(positions: NDArray[Any], axis: int) -> float:
-    """The mean step between neighbours along an axis of a grid; 0 if it has one place only, NaN where missing."""
+    """The mean step along an axis of a grid, with NaN for missing views; 0 for a single position."""
     if positions.shape[axis] < 2:
         return 0.0
     places = np.arange(positions.shape[axis])

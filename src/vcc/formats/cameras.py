@@ -1,4 +1,4 @@
-"""A frame as the array of cameras that it stands for, and back."""
+"""Conversion between a frame and the array of cameras that it describes."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from vcc.base.errors import InputError
 from vcc.fields.grid import Grid, camera_array_frame
 
 Pair = float | tuple[float, float]
-"""One number for both axes, or (along rows of views or pixels, along columns)."""
+"""One number for both axes, or (along rows, along columns)."""
 
-_PRECISION = 1e-9  # of a step: where a frame is that of a camera array
+_PRECISION = 1e-9  # of a step: tolerance for a frame of a camera array
 
 
 @dataclass(frozen=True)
 class Cameras:
-    """A planar array of parallel cameras, as `vcc.LightField.from_views` takes it.
+    """A planar array of parallel cameras, as in `vcc.LightField.from_views`.
 
     Args:
         spacing: distance (dv, du) between neighbouring views, metres.
         slope_per_pixel: pixel pitch over focal length, (pt, ps).
-        focus_distance: where the views converge, metres; infinite if they are parallel.
+        focus_distance: distance at which the views converge, metres; infinite if they are parallel.
     """
 
     spacing: tuple[float, float]
@@ -32,7 +32,7 @@ class Cameras:
     focus_distance: float = math.inf
 
     def frame(self, shape: tuple[int, ...]) -> Affine:
-        """The frame of their pictures.
+        """The frame of the cameras' images.
 
         Args:
             shape: (v, u, t, s[, channels]).
@@ -44,16 +44,16 @@ class Cameras:
 
     @property
     def are_parallel(self) -> bool:
-        """Whether the views converge nowhere."""
+        """Whether the views are parallel."""
         return math.isinf(self.focus_distance)
 
     @property
     def are_square(self) -> bool:
-        """Whether rows and columns are alike."""
+        """Whether spacing and slope per pixel are equal along rows and columns."""
         return all(math.isclose(*both, rel_tol=_PRECISION) for both in (self.spacing, self.slope_per_pixel))
 
     def turned(self) -> Cameras:
-        """The same with rows and columns of views exchanged."""
+        """Copy with rows and columns of views exchanged."""
         return replace(self, spacing=self.spacing[::-1])
 
 
@@ -61,13 +61,13 @@ def cameras_of(grid: Grid) -> Cameras:
     """The cameras of a light field.
 
     Raises:
-        InputError: its frame is not that of a centred array of parallel or converging cameras.
+        InputError: the frame is not that of a centred array of parallel or converging cameras.
     """
     linear, (nv, nu, nt, ns) = grid.frame.linear, grid.shape[:4]
     fault = InputError(
-        "the frame of this light field is not that of cameras on a grid centred on the axis (it was cut, turned "
-        "or has flown on), which a folder of pictures cannot state. Write a .zarr, .npz or .mat, which keep any "
-        "frame"
+        "the frame of this light field is not that of cameras on a grid centred on the axis (it was cropped, "
+        "rotated or propagated), so a folder of pictures cannot store it. Write a .zarr, .npz or .mat, which keep "
+        "any frame"
     )
     du, dv, ps, pt = map(float, (linear[0, 0], linear[1, 1], -linear[2, 2], -linear[3, 3]))
     if not min(du, dv, ps, pt) > 0:

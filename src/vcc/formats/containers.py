@@ -1,4 +1,4 @@
-"""Formats that hold a whole light field in one file (or in a folder that is one thing)."""
+"""Formats that store a whole light field in one file (or in one folder that counts as a file)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from vcc.formats import arrays, eslf, hci_2013, lftoolbox, lytro_lfp, plenoptomo
 from vcc.formats.grid import Decoded
 
 _MODULES = (
-    # Each is a module with `recognised(path: Path) -> bool`, quick and by the ending or the first bytes, and
-    # `read(path: Path, *, …) -> Decoded`; keyword arguments of `read` are options that `open_light_field(path, …)`
-    # passes on, but for `progress`, which it takes if it has something to say. The first that recognises a path
-    # reads it.
+    # Each module has `recognised(path: Path) -> bool`, a quick check of extension or first bytes, and
+    # `read(path: Path, *, …) -> Decoded`. Keyword arguments of `read` are options that `open_light_field(path,
+    # …)` passes on, except `progress`, which is optional. The first module that recognises a path reads it.
     lftoolbox,
     hci_2013,
     plenoptomos_vox,
@@ -28,36 +27,35 @@ _MODULES = (
     eslf,
 )
 CONTAINERS = {module.__name__.rpartition(".")[2]: module for module in _MODULES}
-"""The modules that read them, by their names."""
+"""The modules by name."""
 
 
 def container_of(path: Path) -> ModuleType | None:
-    """The module that reads this file or folder; None if none does.
+    """The module that reads this file or folder; None if there is none.
 
     Raises:
-        InputError: there is no such file or folder, or it cannot be read.
+        InputError: the path does not exist or cannot be read.
     """
     check_path(path, "folder or file")
     return next((module for module in CONTAINERS.values() if module.recognised(path)), None)
 
 
 def read_container(path: Path, progress: Progress | None = None, **options: Any) -> Decoded:
-    """What a file holds, as stored.
+    """Read the content of a file as stored.
 
     Args:
         path: the file.
         progress: called as progress(done, total) while it is read.
-        options: what the format's reader takes, such as ``views=(15, 15)``.
+        options: options of the format's reader, such as ``views=(15, 15)``.
 
     Raises:
-        InputError: no such file, a format that is not known, an option that its reader does not take, or what the
-            reader says.
+        InputError: no such file, an unknown format, an unsupported option, or as raised by the reader.
     """
     path = expanded(path)
     with reading(path, "a light field"):
         module = container_of(path)
         if module is None:
-            raise InputError(f"{path} is in no format that is known")
+            raise InputError(f"{path} is not in a supported format")
         return _read(module, path, progress, options)
 
 
@@ -67,7 +65,7 @@ def _read(module: ModuleType, path: Path, progress: Progress | None, options: di
     for option in options:
         if option not in taken:
             takes = f"takes {', '.join(taken)}" if taken else "takes no options"
-            raise InputError(f"{path}: {option}= means nothing to this format, which {takes}")
+            raise InputError(f"{path}: {option}= is not supported by this format, which {takes}")
     if "progress" in parameters:
         options["progress"] = progress
     decoded: Decoded = module.read(path, **options)

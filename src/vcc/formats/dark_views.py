@@ -1,4 +1,4 @@
-"""Views that are black or nearly so, as in the corners of a plenoptic camera's grid, beside its round pupil."""
+"""Detection of nearly black views, such as the corners of a plenoptic camera's grid, outside its pupil."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from vcc.files import transfer as curves
 Place = tuple[int, int]
 
 _NEARLY_BLACK = 0.02
-"""Of the light of the brightest view: 5.6 stops, which leave a dozen of 255 sRGB codes to what was mid-grey. No
-vignetting and no flicker of a lamp takes that much from one view of a light field and not from another."""
-_PIXELS = 64  # along a side, that are looked at: mean light to some per cent
+"""Fraction of the brightest view's light: 5.6 stops, which leave about a dozen of 255 sRGB codes for mid-grey.
+Neither vignetting nor lamp flicker causes such a difference between views of one light field."""
+_PIXELS = 64  # sampled along a side: mean light to a few per cent
 
 
 def mean_light(view: NDArray[Any], transfer: str) -> float:
-    """The mean light of some of the pixels of a view.
+    """The mean light of a view, from a sample of its pixels.
 
     Args:
         view: shape (t, s[, channel]).
-        transfer: "srgb" or "linear": how integers stand for light.
+        transfer: "srgb" or "linear": transfer function of integers.
     """
     some = view[:: max(1, view.shape[0] // _PIXELS), :: max(1, view.shape[1] // _PIXELS)]
     if transfer == "srgb" and some.dtype in (np.uint8, np.uint16):
@@ -33,7 +33,7 @@ def mean_light(view: NDArray[Any], transfer: str) -> float:
 
 
 def dark_places(light: Mapping[Place, float]) -> list[Place]:
-    """(row, column) of the views with less than 2 % of the brightest one's light; none where all are black.
+    """(row, column) of the views with less than 2 % of the brightest view's light; none if all are black.
 
     Args:
         light: mean light of each view.
@@ -43,7 +43,7 @@ def dark_places(light: Mapping[Place, float]) -> list[Place]:
 
 
 def dark_words(light: Mapping[Place, float]) -> str:
-    """How many views are dark, and which; empty for none."""
+    """Text on the number and places of dark views; empty if there are none."""
     dark = dark_places(light)
     if not dark:
         return ""
@@ -54,12 +54,12 @@ def dark_words(light: Mapping[Place, float]) -> str:
 
 
 def dark_notice(views: Mapping[Place, NDArray[Any]]) -> str:
-    """A word on views that are dark, and what to do with them; empty for none.
+    """Notice on dark views and what to do with them; empty if there are none.
 
     Args:
-        views: linear, by (row, column).
+        views: linear views by (row, column).
     """
     words = dark_words({place: mean_light(view, "linear") for place, view in views.items()})
     if not words:
         return ""
-    return f"{words}. A camera takes them for light that does not come: cut them off, like light_field[1:-1, 1:-1]"
+    return f"{words}. A camera treats them as missing light: crop them, as in light_field[1:-1, 1:-1]"

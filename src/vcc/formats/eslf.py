@@ -1,4 +1,4 @@
-"""One picture of all views: ESLF, in which the block of views behind each lenslet is tiled over the image, and
+"""All views in one picture: ESLF, in which the block of views behind each lenslet is tiled over the image, and
 mosaics of whole views.
 """
 
@@ -27,12 +27,12 @@ from vcc.formats.tiles import Layout, check, mosaic_evidence, put_together, take
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".ppm")
 
-_CLEARLY = 1.4  # real pictures of five light fields, whole and in parts, gave 1.95 and more either way
+_CLEARLY = 1.4  # the pictures of five light fields, whole and in parts, gave 1.95 or more either way
 _KNOWN = {(5264, 7574): (14, 14), (6510, 9375): (15, 15)}  # Stanford's archive, and the Light Field Toolbox
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is a single picture: as a light field it can be nothing else."""
+    """Whether the path is a single picture, which can only be one of all views."""
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
@@ -43,22 +43,21 @@ def read(
     layout: Layout | None = None,
     order: Order | None = None,
 ) -> Decoded:
-    """The views of a picture that holds all of them.
+    """Read the views of a picture that contains all of them.
 
-    In an ESLF pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i); in a mosaic view (j, i) is the
-    tile at row j and column i.
+    In an ESLF, pixel (l·rows + j, k·columns + i) is pixel (l, k) of view (j, i); in a mosaic, view (j, i) is
+    the tile at row j and column i.
 
     Args:
-        path: the picture. The opacity of a PNG is the weight of its samples.
-        views: (rows, columns) of views. Known for the sizes of Stanford's archive (14×14, 7574×5264 pixels) and of
-            the Light Field Toolbox (15×15, 9375×6510).
-        layout: "eslf" or "mosaic"; found from the picture if not given, see `vcc.formats.tiles.mosaic_evidence`.
-        order: how the views are counted through blocks or tiles, see `vcc.formats.orders`; row by row if not
-            given.
+        path: the picture. The alpha channel of a PNG is the weight of its samples.
+        views: (rows, columns) of views. Known for the sizes of Stanford's archive (14×14, 7574×5264 pixels) and
+            of the Light Field Toolbox (15×15, 9375×6510).
+        layout: "eslf" or "mosaic"; detected by default, see `vcc.formats.tiles.mosaic_evidence`.
+        order: order of the views in blocks or tiles, see `vcc.formats.orders`; row by row by default.
 
     Raises:
-        InputError: a picture that cannot be read, views that are not known or impossible, a picture that does not
-            tell its layout.
+        InputError: an unreadable picture, views that are unknown or impossible, or a layout that cannot be
+            detected.
     """
     orders.check(views, order)
     check(layout)
@@ -105,16 +104,16 @@ def save(
 ) -> Path:
     """Write a light field as one sRGB-encoded PNG.
 
-    Read back, samples differ by half a code of the sRGB curve at most; they carry no geometry.
+    Reading returns samples that differ by at most half a code of the sRGB curve; the geometry is not stored.
 
     Args:
-        light_field: what to write, grey or of 3 channels, values 0 to 1 (or unsigned integers).
-        path: where to; ends in .png.
+        light_field: the light field, grey or of 3 channels, values 0 to 1 (or unsigned integers).
+        path: path to write to; ends in .png.
         bits: bits per sample, 8 or 16.
-        kind: "eslf", each lenslet's block of views tiled, or "mosaic", whole views side by side.
+        kind: "eslf" (each lenslet's block of views tiled) or "mosaic" (whole views side by side).
 
     Raises:
-        InputError: another ending, other channels, values above 1, or a place that cannot be written to.
+        InputError: another extension, other channels, values above 1, or a path that is not writable.
     """
     path = Path(path).expanduser()
     check(kind)
@@ -137,39 +136,39 @@ def save(
 
 
 def _layout(samples: NDArray[Any], views: tuple[int, int], known: tuple[int, int] | None, path: Path) -> Layout:
-    """The layout that a picture shows; one of a size that ESLFs are known to have need not show it clearly."""
+    """The layout of a picture; unclear pictures of a size known for ESLFs count as ESLF."""
     if samples.shape[0] % views[0] or samples.shape[1] % views[1]:
-        return "eslf"  # whose last blocks may be cut off
+        return "eslf"  # its last blocks may be cut off
     evidence = mosaic_evidence(samples, views)
     if max(evidence, 1 / evidence) > _CLEARLY:
         return "mosaic" if evidence > 1 else "eslf"
     if known == views:
         return "eslf"
     raise InputError(
-        f"{path} does not tell whether it is a mosaic of {views[0]}×{views[1]} views or an ESLF (the block of "
+        f"{path} does not show whether it is a mosaic of {views[0]}×{views[1]} views or an ESLF (the block of "
         'views behind each lenslet tiled): pass layout="mosaic" or layout="eslf"'
     )
 
 
 def _cut_off(height: int, width: int, views: tuple[int, int], layout: Layout, path: Path) -> tuple[str, ...]:
-    """What to say of blocks that are cut off; tiles of a mosaic may not be."""
+    """Notice on blocks that are cut off; raises for tiles of a mosaic."""
     rows, columns = views
     if height % rows == width % columns == 0:
         return ()
     if layout == "mosaic":
         raise InputError(
-            f"{path}: {height}×{width} pixels (rows × columns) are no whole number of tiles, {rows}×{columns} of "
-            "them. Correct views=, or crop the picture to the views"
+            f"{path}: {height}×{width} pixels (rows × columns) are not a multiple of {rows}×{columns} "
+            "tiles. Correct views=, or crop the picture to the views"
         )
     return (
-        f"{height}×{width} pixels (rows × columns) are no whole number of blocks of {rows}×{columns} views; "
-        f"the last {height % rows} rows and {width % columns} columns, cut off blocks, were left out. Is it a "
-        "mosaic, or are views= others?",
+        f"{height}×{width} pixels (rows × columns) are not a multiple of blocks of {rows}×{columns} views; "
+        f"the last {height % rows} rows and {width % columns} columns were left out. Is it a "
+        "mosaic, or is views= wrong?",
     )
 
 
 def _in_order(tiles: NDArray[Any], views: tuple[int, int], order: Order) -> NDArray[Any]:
-    """Views that stand in a picture as they are counted, each in its place."""
+    """Move views from their counted order to their rows and columns."""
     if order == "row-major":
         return np.ascontiguousarray(tiles)
     flat = tiles.reshape(-1, *tiles.shape[2:])
@@ -177,7 +176,7 @@ def _in_order(tiles: NDArray[Any], views: tuple[int, int], order: Order) -> NDAr
 
 
 def _samples(path: Path) -> tuple[NDArray[Any], NDArray[np.float32] | None]:
-    """The picture, and its opacity as weights if it is not opaque."""
+    """The picture, and its alpha channel as weights if it is not opaque."""
     if path.suffix.lower() != ".png":
         return read_picture(path)[0], None
     samples = read_stored(path)

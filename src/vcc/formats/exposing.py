@@ -1,4 +1,4 @@
-"""Light fields as numbers of 8 or 16 bits, view by view, and what of them that clips."""
+"""Light fields as integers of 8 or 16 bits, view by view, with a count of clipped samples."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from vcc.files.pictures import Exposure, auto_exposure, checked_exposure
 
 
 class Codes:
-    """The views of a light field as stored numbers; counts what does not fit.
+    """The views of a light field as stored integers; counts clipped samples.
 
     Args:
-        light_field: in memory or in a store; only the views that are asked for are read.
+        light_field: a light field in memory or in a store; only requested views are read.
         bits: 8 or 16.
-        curve: "srgb" for display-referred numbers, "linear" for numbers proportional to light.
-        exposure: factor on the radiance (of which 1, or the full scale of integers, becomes the largest
-            number); "auto" takes 1 over the 99.5th percentile of the brightest channels in the middle view.
+        curve: "srgb" for display-referred numbers, "linear" for linear numbers.
+        exposure: factor on the radiance; radiance 1, or the full scale of integers, becomes the largest number.
+            "auto" uses 1 over the 99.5th percentile of the brightest channels in the central view.
 
     Raises:
         InputError: other bits, an unknown curve, or an exposure that is neither "auto" nor a finite number
@@ -40,11 +40,11 @@ class Codes:
 
     @property
     def clipped(self) -> float:
-        """The share, 0 to 1, of the samples asked for so far that are too bright."""
+        """The fraction, 0 to 1, of the samples requested so far that were clipped."""
         return self._beyond / self._seen if self._seen else 0.0
 
     def view(self, row: int, column: int) -> NDArray[Any]:
-        """A view's numbers, uint8 or uint16, shape (rows, columns) or (rows, columns, channels)."""
+        """The integers of a view, uint8 or uint16, shape (rows, columns) or (rows, columns, channels)."""
         samples, full_scale = stored_view(self._light_field, row, column)
         kind = np.dtype(f"uint{self._bits}")
         self._seen += samples.size
@@ -52,10 +52,10 @@ class Codes:
             return samples
         light = samples.astype(np.float32) * np.float32(self.exposure / full_scale)
         largest = 2**self._bits - 1
-        self._beyond += int(np.count_nonzero(light > 1 + 0.5 / largest))  # what rounds to white is not lost
+        self._beyond += int(np.count_nonzero(light > 1 + 0.5 / largest))  # what rounds to white is kept
         if self._curve == "srgb":
             return transfer.encode(light, self._bits)
-        # float64: in float32, 16-bit numbers above 2^24/2^16 would come with an error of their own
+        # float64: in float32, rounding errors would be visible in 16-bit numbers
         codes: NDArray[Any] = np.rint(np.clip(light.astype(np.float64), 0, 1) * largest).astype(kind)
         return codes
 
@@ -66,5 +66,5 @@ class Codes:
 
 
 def stored_view(light_field: Samples, row: int, column: int) -> tuple[NDArray[Any], float]:
-    """A view's samples, linear, as they are held, and what of them stands for radiance 1."""
+    """A view's linear samples as stored, and the value of radiance 1."""
     return one_view(light_field, row, column), light_field.grid.full_scale

@@ -1,4 +1,4 @@
-"""Films of pictures that people are to see: MP4 (H.264) and GIF."""
+"""Films for display: MP4 (H.264) and GIF."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ Codes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Film:
-    """How frames are written.
+    """Format and rate of a film.
 
     Args:
-        ending: ".mp4" or ".gif". A GIF has 256 colours a frame, and plays over and over.
-        frames_per_second: at most 50 in a GIF, whose clock counts hundredths of a second.
+        ending: ".mp4" or ".gif". A GIF has 256 colours a frame and loops.
+        frames_per_second: at most 50 in a GIF, which measures time in hundredths of a second.
 
     Raises:
-        InputError: an impossible rate.
+        InputError: an invalid rate.
     """
 
     ending: str
@@ -41,15 +41,15 @@ class Film:
             )
 
     def write(self, frames: Iterable[Codes], path: Path, words: str) -> None:
-        """Write frames.
+        """Write frames to a file.
 
         Args:
-            frames: sRGB codes, (rows, columns, 3), all alike.
-            path: where to.
-            words: what to call the file in an error.
+            frames: sRGB codes, (rows, columns, 3), all of one size.
+            path: path to write to.
+            words: name of the file in an error.
 
         Raises:
-            InputError: no PyAV for an MP4, or frames that it cannot hold.
+            InputError: no PyAV for an MP4, or unsupported frames.
         """
         if self.ending == ".gif":
             self._write_gif(list(frames), path)
@@ -57,14 +57,14 @@ class Film:
             self._write_mp4(frames, path, words)
 
     def _write_mp4(self, frames: Iterable[Codes], path: Path, words: str) -> None:
-        # The common chroma of H.264 goes by pairs of pixels.
+        # The usual chroma subsampling of H.264 needs even sizes.
         even = (
             np.pad(each, ((0, each.shape[0] % 2), (0, each.shape[1] % 2), (0, 0)), mode="edge") for each in frames
         )
         video.encode(path, even, self.frames_per_second, quality=18, lossless=False, words=words)
 
     def _write_gif(self, frames: Sequence[Codes], path: Path) -> None:
-        """By Pillow, which Matplotlib brings; without FFmpeg."""
+        """Write a GIF by Pillow, a dependency of Matplotlib; FFmpeg is not needed."""
         from PIL import Image as Picture
 
         pictures = [

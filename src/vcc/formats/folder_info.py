@@ -1,4 +1,4 @@
-"""What a folder of views or a file holds, and the cameras that it states."""
+"""Content of a folder of views or a file, and the cameras that it states."""
 
 from __future__ import annotations
 
@@ -21,32 +21,32 @@ from vcc.formats.views_with_metadata import ViewsWithMetadata
 
 @dataclass(frozen=True, repr=False)
 class FolderInfo(Brief):
-    """What a folder of views, or a file with a light field, holds.
+    """Content of a folder of views, or of a file with a light field.
 
     Args:
-        format: what its files follow, for people.
-        rows: how many rows of views.
-        columns: how many columns of views.
-        height: of a view, pixels.
-        width: of a view, pixels.
+        format: name of the format, for people.
+        rows: number of rows of views.
+        columns: number of columns of views.
+        height: height of a view, pixels.
+        width: width of a view, pixels.
         channels: colour channels; None for grey pictures.
         bits: bits per stored sample: 8, 16 or 32 (floating point).
         spacing: distance (dv, du) between neighbouring views, metres.
         slope_per_pixel: pixel pitch over focal length.
-        focus_distance: where the views converge, metres; infinite if parallel.
+        focus_distance: distance at which the views converge, metres; infinite if parallel.
         disparity_range: (lowest, highest), pixels per view; None if not stated.
-        unknown: which of spacing, slope_per_pixel and focus_distance the folder does not state (or
-            not with a unit), so that a default stands above.
+        unknown: names among spacing, slope_per_pixel and focus_distance that the folder does not state (or
+            states without a unit), so that the value is a default.
         files: ``files[row][column]``, row 0 at the top, column 0 at the left; None for a missing view; empty for
             a light field in one file.
-        directions: +1 or −1 for rows and columns of views: whether the camera positions that the
-            format states grow from one to the next; None if it states none.
-        missing: (row, column) of the views that there are not.
-        transfer: "srgb" or "linear", as the format has it.
-        frame: the full 5×5 frame, where the format states one; spacing and the next two are then read from it.
-        notices: of the format's reader, sentences.
-        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; means unless the files say otherwise.
-        metadata: of the pictures of a folder.
+        directions: +1 or −1 for rows and columns of views: the sign of the steps between stated camera
+            positions; None if the format states no positions.
+        missing: (row, column) of the missing views.
+        transfer: "srgb" or "linear", as defined by the format.
+        frame: the full 5×5 frame if the format states one; spacing and the next two are then derived from it.
+        notices: notices of the format's reader, each a sentence.
+        sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` unless the files state otherwise.
+        metadata: metadata of the pictures of a folder.
     """
 
     format: str
@@ -72,24 +72,24 @@ class FolderInfo(Brief):
 
     @property
     def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
-        """As which ``transfer`` to open it to have the stored numbers, and how these stand for light.
+        """The ``transfer`` with which to open the stored numbers, and their transfer function.
 
-        Numbers that were exposed or turned when they were written are had as linear light only.
+        Numbers that were exposed or rotated on writing are available as linear light only.
         """
         return ("as-is", self.transfer) if self.metadata.is_neutral else ("auto", "linear")
 
     @property
     def picture_shape(self) -> tuple[int, ...]:
-        """Of a view: (height, width) or (height, width, channels)."""
+        """Shape of a view: (height, width) or (height, width, channels)."""
         return (self.height, self.width) + (() if self.channels is None else (self.channels,))
 
 
 def info_of_grid(grid: ViewGrid) -> FolderInfo:
-    """What a grid of files holds, from its first picture.
+    """Content of a grid of files, from its first picture.
 
     Raises:
-        InputError: a picture that cannot be read, or of another size than stated; pictures that say contradictory
-            things of their numbers.
+        InputError: a picture that cannot be read, or has another size than stated; pictures with contradictory
+            metadata.
     """
     some = next(iter(grid.present.values()))
     first, bits = read_picture(some)
@@ -107,7 +107,7 @@ def info_of_grid(grid: ViewGrid) -> FolderInfo:
 
 
 def info_of_file(decoded: Decoded) -> FolderInfo:
-    """What a decoded file holds."""
+    """Content of a decoded file."""
     shape, bits = decoded.values.shape, decoded.values.dtype.itemsize * 8
     info = _info(decoded.format, shape[:2], shape[2:], bits, decoded.geometry)
     info = replace(info, transfer=decoded.transfer, notices=decoded.notices, frame=decoded.frame)
@@ -127,7 +127,7 @@ def info_of_file(decoded: Decoded) -> FolderInfo:
 def _info(
     kind: str, views: tuple[int, ...], picture: tuple[int, ...], bits: int, geometry: Geometry
 ) -> FolderInfo:
-    """What is stated, and defaults for what is not."""
+    """Stated values, and defaults for the others."""
     stated = {
         "spacing": geometry.spacing is not None and not geometry.spacing_unit,
         "slope_per_pixel": geometry.slope_per_pixel is not None,
@@ -155,7 +155,7 @@ def _info(
 
 
 def _focus(geometry: Geometry, spacing: float, slope_per_pixel: float) -> float:
-    """Where the views converge; negative where their pictures are shifted apart."""
+    """Distance at which the views converge; negative if their pictures are shifted apart."""
     if geometry.focus_distance is not None:
         return geometry.focus_distance
     shift = geometry.disparity_at_infinity
@@ -164,7 +164,7 @@ def _focus(geometry: Geometry, spacing: float, slope_per_pixel: float) -> float:
 
 @dataclass(frozen=True)
 class Given:
-    """What a user says of the cameras; None for what is left to the files. See `vcc.formats.open_light_field`."""
+    """The user's arguments on the cameras; None to use the files. See `vcc.formats.open_light_field`."""
 
     spacing: Pair | None
     slope_per_pixel: Pair | None
@@ -172,7 +172,7 @@ class Given:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What is given."""
+        """Names of the given values."""
         return tuple(name for name, value in vars(self).items() if value is not None)
 
 
@@ -182,16 +182,16 @@ def _both(name: str, given: Pair) -> tuple[float, float]:
 
 
 def cameras_for(info: FolderInfo, stated: Geometry, given: Given, path: Path) -> Cameras | None:
-    """The cameras of a folder or file: what is given goes before what is stated. None where a frame is stated.
+    """The cameras of a folder or file; given values override stated ones. None if a frame is stated.
 
     Args:
-        info: what it holds.
-        stated: what its format states of the cameras.
-        given: what the user says.
-        path: how to name it in an error.
+        info: content of the folder or file.
+        stated: geometry stated by the format.
+        given: values given by the user.
+        path: path for messages.
 
     Raises:
-        InputError: something given that a stated frame contradicts, views that converge nowhere, or a spacing,
+        InputError: a given value that contradicts a stated frame, views that do not converge, or a spacing,
             slope or focus distance of zero or less.
     """
     if info.frame is not None:
@@ -214,5 +214,5 @@ def cameras_for(info: FolderInfo, stated: Geometry, given: Given, path: Path) ->
                 "Pass focus_distance=…"
             )
     cameras = Cameras(spacing, slope, focus)
-    cameras.frame((1, 1, 1, 1))  # refuse before the long reading
+    cameras.frame((1, 1, 1, 1))  # raises before the slow reading
     return cameras

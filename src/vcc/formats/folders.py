@@ -1,4 +1,4 @@
-"""Which grid of views a folder holds, and which cameras its files state."""
+"""Detection of the grid of views in a folder, and of the cameras that its files state."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vcc.formats.grid import Geometry, ViewGrid
 from vcc.formats.orders import Order, counted_from, running_numbers
 
 _FINDERS = (hci.find, camera_names.find, camera_names.find_of_gantry, rowcol.find)
-"""The formats in the order in which they are tried, behind a list of views."""
+"""The formats in the order of detection, after a list of views."""
 
 
 def find_grid(
@@ -26,23 +26,23 @@ def find_grid(
     files_outside: bool = False,
     options: Collection[str] = (),
 ) -> ViewGrid:
-    """The grid of views in a folder, from the first format that fits.
+    """The grid of views in a folder, from the first format that matches.
 
     Args:
-        folder: where the pictures are.
+        folder: folder of the pictures.
         views: see `vcc.formats.open_light_field`.
-        order: likewise.
-        sparse: leave None where a view is missing, instead of refusing the folder.
+        order: see `vcc.formats.open_light_field`.
+        sparse: use None for missing views instead of raising.
         files_outside: see `vcc.formats.open_light_field`.
-        options: names of others, which no folder takes.
+        options: names of further options, which are not supported for folders.
 
     Raises:
-        InputError: no such folder, no views in it, views that are missing or too many, or impossible options.
+        InputError: no such folder, no views in it, missing or extra views, or invalid options.
     """
     _check(folder, views, order, options)
     for find in (partial(views_csv.find, anywhere=files_outside), *_FINDERS):
         grid = find(folder, sparse=sparse)
-        # A single "row" whose size is not as told is a running number after another number.
+        # A single "row" of another size than given is a running number after another number.
         if grid is None or (find is rowcol.find and views not in (None, grid.shape) and 1 in grid.shape):
             continue
         if order is not None:
@@ -59,10 +59,10 @@ def find_grid(
 
 
 def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
-    """The grid with the top left view first, where true positions say that its files are counted otherwise.
+    """Reorder the grid to have the top left view first, if true positions show another order of its files.
 
     Returns:
-        The grid, and what to say of it; empty where it stays as it was.
+        The grid, and a notice; the notice is empty if nothing was changed.
     """
     directions = grid.geometry.directions
     if directions is None or not grid.geometry.directions_are_true or directions == (1, 1):
@@ -79,13 +79,13 @@ def towards_positions(grid: ViewGrid) -> tuple[ViewGrid, str]:
 def _check(folder: Path, views: tuple[int, int] | None, order: Order | None, options: Collection[str]) -> None:
     if not check_path(folder, "folder or file"):
         raise InputError(
-            f"{folder} is a file in no format that is known. A light field is opened from a folder with a picture "
+            f"{folder} is not a file in a supported format. A light field is opened from a folder with a picture "
             "for each view, or from one of the files that docs/files.md lists"
         )
     if (folder / "zarr.json").is_file():
         raise InputError(f"{folder} is a store, which is read in pieces: open it with vcc.store.open_store")
     for option in options:
-        raise InputError(f"{option}= means nothing to a folder of views")
+        raise InputError(f"{option}= is not supported for a folder of views")
     orders.check(views, order)
 
 
@@ -97,9 +97,9 @@ def _reordered(grid: ViewGrid, order: Order) -> ViewGrid:
 
 
 def _with_cameras(grid: ViewGrid, folder: Path) -> ViewGrid:
-    """The grid with the cameras that names or a file of the folder state, where its own format has none.
+    """Add the cameras stated by file names or a camera file, unless the grid's own format states them.
 
-    ``parameters.cfg`` goes before names: somebody put it there. What names say of the order of views stays.
+    ``parameters.cfg`` overrides names: a user put it there. The order of views still follows the names.
     """
     if grid.format == hci.KIND:
         return grid
@@ -113,7 +113,7 @@ def _with_cameras(grid: ViewGrid, folder: Path) -> ViewGrid:
 
 
 def _by_names(grid: ViewGrid, folder: Path) -> Geometry:
-    """The cameras that the names of views state, or ``param.txt``."""
+    """The cameras stated by the names of views, or by ``param.txt``."""
     if grid.geometry != Geometry():
         return grid.geometry
     for read in (camera_names.read_geometry, camera_names.geometry_of_gantry):

@@ -1,4 +1,4 @@
-"""Grids of views: which file stands at which row and column, and whether all of them are there."""
+"""Grids of views: the file at each row and column, and checks for completeness."""
 
 from __future__ import annotations
 
@@ -19,20 +19,18 @@ from vcc.base.words import first_few
 from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
-"""The endings of the files that views may be stored in."""
+"""Extensions of files for views."""
 
 MOST_PLACES = 2**20
-"""Of a grid of which views are missing: a name with a wrong number could claim any."""
+"""Maximum size of a grid with missing views: a name with a wrong number could claim any size."""
 
 DEFAULT_SPACING = 1 * mm
-"""The view spacing taken where nothing states one, metres."""
+"""Default view spacing, metres."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A view as a file name or list gives it: its numbers, whatever they count from, and its
-    file.
-    """
+    """A view as stated by a file name or list: its numbers, counted from any start, and its file."""
 
     row: int
     column: int
@@ -41,22 +39,22 @@ class Place:
 
 @dataclass(frozen=True)
 class Geometry:
-    """What a format states of the cameras; None for each quantity that it does not.
+    """Geometry of the cameras as stated by a format; None for unknown quantities.
 
     Args:
         spacing: distance (dv, du) between neighbouring views, metres.
-        spacing_unit: "" where the unit of the spacing is known; else what its numbers are taken for, "mm" or "m".
+        spacing_unit: "" if the unit of the spacing is known; else the assumed unit, "mm" or "m".
         slope_per_pixel: pixel pitch over focal length.
-        focus_distance: where the views converge, metres; infinite if parallel.
-        disparity_at_infinity: disparity of infinitely far points, pixels per view, from which the focus distance
-            follows with the spacing: −du/(p·F). For formats that state a shift of the pictures.
+        focus_distance: distance at which the views converge, metres; infinite if parallel.
+        disparity_at_infinity: disparity of infinitely far points, pixels per view, which with the spacing gives
+            the focus distance: −du/(p·F). For formats that state a shift of the pictures.
         disparity_range: (lowest, highest), pixels per view.
-        directions: (+1 or −1 along rows of views, likewise columns): whether the stated camera
-            position grows from one to the next.
-        directions_are_true: the positions are known to grow downwards and to the right, so that a −1 says that the
-            files are counted the other way.
-        picture_shape: (rows, columns) that the pictures must have.
-        sample: what a sample is, see `vcc.LightField`: means over pixels unless a file says otherwise.
+        directions: (+1 or −1 along rows of views, likewise columns): the sign of the steps between stated
+            camera positions.
+        directions_are_true: whether positions are known to grow downwards and to the right, so that −1 means
+            that the files are counted in reverse.
+        picture_shape: (rows, columns) required of the pictures.
+        sample: meaning of a sample, see `vcc.LightField`; means over pixels unless a file states otherwise.
     """
 
     spacing: tuple[float, float] | None = None
@@ -73,21 +71,21 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Decoded(Brief):
-    """What one file (or a folder that is one thing) holds, before it is made a light field.
+    """Content of one file (or of a folder that counts as a file), before conversion to a light field.
 
     Args:
-        format: what the file follows, for people.
+        format: name of the format, for people.
         values: the samples as stored, shape (v, u, t, s) or (v, u, t, s, channels), unsigned integers (fractions
             of their full scale) or floating point.
-        transfer: "srgb" for display-referred samples, "linear" for those proportional to light.
-        geometry: what is known of the cameras, where there is no ``frame``.
-        frame: the 5×5 frame, indices from 0, where the format has a full one.
-        depth: true distances Z, metres, of the pixels of each view, shape (v, u, t, s), or of the centre view,
+        transfer: "srgb" for display-referred samples, "linear" for linear ones.
+        geometry: known geometry of the cameras, if there is no ``frame``.
+        frame: the 5×5 frame, indices from 0, if the format states a full one.
+        depth: true distances Z, metres, of the pixels of each view, shape (v, u, t, s), or of the central view,
             shape (t, s).
-        disparity: likewise true disparities, pixels per view, positive where nearer than the focus.
-        weights: how much each sample is to be trusted, 0 (unknown) to 1, shape (v, u, t, s).
-        notices: for the user, each a sentence.
-        metadata: everything else that the file states, as plain values.
+        disparity: likewise true disparities, pixels per view, positive if nearer than the focus.
+        weights: confidence of each sample, 0 (unknown) to 1, shape (v, u, t, s).
+        notices: notices for the user, each a sentence.
+        metadata: further metadata of the file, as plain values.
     """
 
     format: str
@@ -103,7 +101,7 @@ class Decoded(Brief):
 
 
 def weights_apart(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32]]:
-    """Samples whose last channel is a weight (or an opacity), not copied, and that weight, 0 to 1.
+    """Split samples whose last channel is a weight (or alpha): the samples, as a view, and the weight, 0 to 1.
 
     Args:
         values: shape (…, channels), unsigned integers or floating point.
@@ -117,10 +115,10 @@ class ViewGrid(Brief):
     """A grid of views.
 
     Args:
-        format: what the files follow, for people.
-        files: files[row][column], row 0 at the top, column 0 at the left; None for a view that is missing from a
-            grid that may be sparse.
-        geometry: what is known of the cameras.
+        format: name of the format, for people.
+        files: files[row][column], row 0 at the top, column 0 at the left; None for a missing view of a sparse
+            grid.
+        geometry: known geometry of the cameras.
     """
 
     format: str
@@ -134,7 +132,7 @@ class ViewGrid(Brief):
 
     @property
     def present(self) -> dict[tuple[int, int], Path]:
-        """The views there are, by (row, column), row by row."""
+        """The existing views by (row, column), row by row."""
         return {
             (row, column): file
             for row, line in enumerate(self.files)
@@ -144,14 +142,14 @@ class ViewGrid(Brief):
 
     @property
     def missing(self) -> tuple[tuple[int, int], ...]:
-        """(row, column) of the views that there are not."""
+        """(row, column) of the missing views."""
         rows, columns = self.shape
         present = self.present
         return tuple((r, c) for r in range(rows) for c in range(columns) if (r, c) not in present)
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """The picture files directly in a folder, by name; hidden ones are left out."""
+    """The picture files directly in a folder, sorted by name, without hidden files."""
     return sorted(
         file
         for file in folder.iterdir()
@@ -166,16 +164,15 @@ def arrange(
     *,
     sparse: bool = False,
 ) -> tuple[tuple[Path | None, ...], ...]:
-    """Files as files[row][column], every place of the grid filled once.
+    """Arrange files as files[row][column], with every place filled once.
 
-    Rows and columns may be counted from any number and in any even step (0, 1, 2 …; 9 … 17; 0, 2, 4
-    …).
+    Rows and columns may be counted from any number and in any constant step (0, 1, 2 …; 9 … 17; 0, 2, 4 …).
 
     Args:
-        places: the views that there are.
-        folder: how to name them all in an error.
-        numbers: the row and column numbers that there must be, where the format states them.
-        sparse: leave None where a view is missing, instead of refusing the grid.
+        places: the existing views.
+        folder: name of the collection in messages.
+        numbers: required row and column numbers, if the format states them.
+        sparse: use None for missing views instead of raising.
 
     Raises:
         InputError: two files for a place, places without a file, or files outside the grid.
@@ -205,14 +202,14 @@ def arrange(
 
 
 def _counted(numbers: list[int]) -> range:
-    """From the lowest number to the highest, in the largest step that meets all."""
+    """From the lowest number to the highest, in the largest step that includes all."""
     low, high = min(numbers), max(numbers)
     step = math.gcd(*(number - low for number in numbers)) or 1
     return range(low, high + 1, step)
 
 
 def length(numbers: range) -> int:
-    """How many numbers, also where they are more than `len` can say."""
+    """Number of elements, also beyond the maximum of `len`."""
     return max(0, (numbers.stop - numbers.start + numbers.step - 1) // numbers.step)
 
 

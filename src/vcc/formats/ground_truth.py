@@ -1,4 +1,4 @@
-"""True disparities and depths that come along with a light field."""
+"""True disparities and depths supplied with a light field."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ _HCI_QUANTITY: dict[str, Quantity] = {"disp": "disparity", "depth": "depth"}
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GroundTruth(Brief):
-    """What is true of each pixel, as far as files state it.
+    """True disparity or depth of each pixel, as stated by files.
 
     Args:
-        source: the file or files, for people.
-        disparity: pixels per view, positive = nearer than where the views converge: shape (t, s) of the middle
-            view, or (v, u, t, s) of all.
-        depth: distance Z from the plane of the cameras, metres (or the files' own unit, where they state none),
+        source: name of the file or files, for people.
+        disparity: pixels per view, positive if nearer than the focus: shape (t, s) of the central view, or (v,
+            u, t, s) of all views.
+        depth: distance Z from the plane of the cameras, metres (or the files' own unit, if none is stated),
             likewise.
     """
 
@@ -43,20 +43,20 @@ class GroundTruth(Brief):
 
 
 def read_ground_truth(path: str | PathLike[str]) -> GroundTruth:
-    """The true disparities or depths in a light field's folder or file.
+    """Read the true disparities or depths in a light field's folder or file.
 
     - HCI 2016: ``gt_disp_lowres.pfm``, ``gt_depth_lowres.pfm``; with ``_CamNNN`` for each view
     - HCI 2013: ``/GT_DEPTH`` of ``lf.h5``
     - INRIA: ``disparity_<row>_<col>.npy`` for each view
-    - Cambridge: ``disparity.npy`` for views base_x apart, brought to the spacing of the views
-    - any: a ``.pfm`` or ``.npy`` file, whose name tells which it is ("disp", "depth")
+    - Cambridge: ``disparity.npy`` for views base_x apart, converted to the spacing of the views
+    - any: a ``.pfm`` or ``.npy`` file with "disp" or "depth" in its name
 
     Args:
-        path: the folder, the light field's file, or the file with the truth itself.
+        path: the folder, the light field's file, or the file with the ground truth.
 
     Raises:
-        InputError: no such file, none of these in the folder, maps of different sizes or missing ones, a damaged
-            file, or a name that does not tell what it holds.
+        InputError: no such file, none of these in the folder, maps of different sizes or missing ones, a
+            damaged file, or a name that does not state the quantity.
     """
     path = expanded(path)
     with reading(path, "true disparities or depths"):
@@ -78,7 +78,7 @@ def _of_folder(folder: Path) -> GroundTruth:
         if found is not None:
             return found
     raise InputError(
-        f"{folder} holds no true disparity or depth that is known: gt_disp_lowres.pfm, disparity_1_1.npy or "
+        f"{folder} holds no supported true disparity or depth: gt_disp_lowres.pfm, disparity_1_1.npy or "
         "disparity.npy with param.txt. Name the .pfm or .npy file itself"
     )
 
@@ -131,13 +131,13 @@ def _of_cambridge(folder: Path) -> GroundTruth | None:
         return None
     if stated.spacing is None:
         raise InputError(f"{folder / cambridge.PARAMETERS} states one view, and one view has no disparity")
-    # The file is for two views base_x apart, which is half the width of all of them.
+    # The file is for two views base_x apart, half the extent of all views.
     steps = stated.spacing[1] / stated.base[1]
     return GroundTruth(path.name, (_map(path) * np.float32(steps)).astype(np.float32))
 
 
 def _stacked(files: dict[tuple[int, int], Path], shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Maps of all views in one array, shape (v, u, t, s)."""
+    """Stack maps of all views in one array, shape (v, u, t, s)."""
     maps: list[NDArray[np.float32]] = []
     for row in range(shape[0]):
         for column in range(shape[1]):
@@ -157,7 +157,7 @@ def _stacked(files: dict[tuple[int, int], Path], shape: tuple[int, int]) -> NDAr
 
 
 def _map(path: Path) -> NDArray[np.float32]:
-    """One map, shape (t, s)."""
+    """Read one map, shape (t, s)."""
     reader: Callable[[Path], NDArray[Any]] = read_pfm if path.suffix.lower() == ".pfm" else read_npy
     values = np.squeeze(reader(path))
     if values.ndim != 2 or values.dtype.kind not in "fui":
@@ -172,7 +172,7 @@ def _named_quantity(path: Path) -> Quantity:
     is_disparity, is_depth = "disp" in name, "depth" in name
     if is_disparity == is_depth:
         raise InputError(
-            f'{path} does not tell whether it holds disparities or depths: put "disp" or "depth" in its name'
+            f'{path} does not state whether it holds disparities or depths: put "disp" or "depth" in its name'
         )
     return "disparity" if is_disparity else "depth"
 

@@ -1,6 +1,6 @@
-"""The 4D light-field benchmark of HCI (Honauer et al. 2016): ``input_CamNNN.png`` and ``parameters.cfg``.
+"""The HCI 4D light field benchmark (Honauer et al. 2016): ``input_CamNNN.png`` and ``parameters.cfg``.
 
-INRIA's synthetic light fields have the same camera file under other names.
+INRIA's synthetic light fields use the same camera file with other names.
 """
 
 from __future__ import annotations
@@ -21,20 +21,19 @@ from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
 PARAMETERS = "parameters.cfg"
 KIND = "HCI 4D light-field benchmark"
 _FOCAL_LENGTH = 100 * mm
-"""What we write: only its ratio to the sensor's size is known, and HCI's scenes have 100 mm."""
+"""Focal length to write: only its ratio to the sensor size is known, and HCI's scenes have 100 mm."""
 
 _NAME = re.compile(r"input_Cam(\d+)", re.IGNORECASE)
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
-    """The grid of the folder's ``input_CamNNN`` pictures, NNN = row × columns + column; None
-    without any.
+    """The grid of the ``input_CamNNN`` pictures, NNN = row × columns + column; None if there are none.
 
-    ``parameters.cfg`` states the grid and the cameras. Without it the grid must be square.
+    ``parameters.cfg`` states the grid and the cameras. Without this file the grid must be square.
 
     Raises:
-        InputError: a ``parameters.cfg`` that cannot be understood, a number of views that is no
-            square (without one), or a grid that `vcc.formats.grid.arrange` refuses.
+        InputError: an invalid ``parameters.cfg``, a number of views that is not a square (without this file),
+            or as in `vcc.formats.grid.arrange`.
     """
     numbered = {file: int(match[1]) for file in pictures_in(folder) if (match := _NAME.fullmatch(file.stem))}
     if not numbered:
@@ -47,10 +46,10 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
 
 
 def read_grid_shape(folder: Path) -> tuple[int, int] | None:
-    """(rows, columns) of views that ``parameters.cfg`` states; None without that file.
+    """(rows, columns) of views stated by ``parameters.cfg``; None without this file.
 
     Raises:
-        InputError: the file cannot be understood.
+        InputError: the file is invalid.
     """
     settings = _settings(folder)
     if settings is None:
@@ -62,15 +61,15 @@ def read_grid_shape(folder: Path) -> tuple[int, int] | None:
 
 
 def read_geometry(folder: Path) -> Geometry | None:
-    """The cameras of ``parameters.cfg``; None without that file.
+    """The cameras of ``parameters.cfg``; None without this file.
 
-    spacing = baseline_mm, slope per pixel = sensor_size_mm / focal_length_mm / max(W, H), and
-    focus_distance_m of 0 stands for parallel cameras. Disparity, pixels per view, is then
-    b·f_px·(1/Z − 1/F), positive = nearer than the focus distance. Rows of views that stand another distance apart
-    than columns have it in baseline_y_mm, an entry of ours.
+    spacing = baseline_mm, slope per pixel = sensor_size_mm / focal_length_mm / max(W, H), and a
+    focus_distance_m of 0 means parallel cameras. The disparity in pixels per view is b·f_px·(1/Z − 1/F),
+    positive if nearer than the focus distance. An additional entry of this package, baseline_y_mm, states the
+    spacing of rows if it differs.
 
     Raises:
-        InputError: the file cannot be understood.
+        InputError: the file is invalid.
     """
     settings = _settings(folder)
     if settings is None:
@@ -95,7 +94,7 @@ def read_geometry(folder: Path) -> Geometry | None:
         spacing=(between_rows, baseline),
         slope_per_pixel=sensor / focal_length / max(width, height),
         focus_distance=focus if focus > 0 else math.inf,
-        disparity_range=(low, high) if low <= high else None,  # NaN where not stated
+        disparity_range=(low, high) if low <= high else None,  # NaN if not stated
         picture_shape=(int(height), int(width)),
         sample=_sample(settings, folder),
     )
@@ -114,11 +113,11 @@ def parameters_text(
 
     Args:
         views: (rows, columns).
-        picture: (height, width) of a view, pixels, which are square.
-        cameras: of the views.
-        scene: its name.
-        disparity_range: (lowest, highest), pixels per view, where known.
-        sample: what a sample is.
+        picture: (height, width) of a view in pixels, which are square.
+        cameras: cameras of the views.
+        scene: name of the scene.
+        disparity_range: (lowest, highest), pixels per view, if known.
+        sample: meaning of a sample.
     """
     rows, columns = views
     height, width = picture
@@ -151,7 +150,7 @@ def parameters_text(
 
 
 def parameters_file(folder: Path) -> Path | None:
-    """The folder's ``parameters.cfg``, or the only .cfg file with the same sections, as INRIA names it."""
+    """The folder's ``parameters.cfg``, else the only .cfg file with the same sections (INRIA's), else None."""
     path = folder / PARAMETERS
     if path.is_file():
         return path
@@ -165,7 +164,7 @@ def parameters_file(folder: Path) -> Path | None:
 
 
 def _sample(settings: configparser.ConfigParser, folder: Path) -> Sample:
-    """An entry of ours, written for samples that are no means over pixels."""
+    """Read the additional entry of this package for samples that are not means over pixels."""
     stated = settings.get("meta", "sample", fallback="mean")
     if stated == "mean":
         return "mean"
@@ -194,7 +193,7 @@ def _number(
     *,
     required: bool = True,
 ) -> float:
-    """A number of the file; NaN for one that is not there and not needed."""
+    """A number of the file; NaN for an optional one that is missing."""
     text = settings.get(section, key, fallback=None) if settings is not None else None
     if text is None:
         if not required:
@@ -210,7 +209,7 @@ def _number(
 
 
 def _square(numbers: list[int], folder: Path) -> tuple[int, int]:
-    """The side of the square grid that holds these views, from their count or their last number."""
+    """The side of the square grid of these views, from their count or their last number."""
     side = math.isqrt(len(numbers))
     if side * side != len(numbers):
         side = math.isqrt(max(numbers) + 1)

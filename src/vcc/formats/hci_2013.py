@@ -13,19 +13,18 @@ from vcc.formats.grid import Decoded, Geometry
 
 
 def recognised(path: Path) -> bool:
-    """Whether the name is one of an HDF5 file."""
+    """Whether the extension is that of an HDF5 file."""
     return path.suffix.lower() in (".h5", ".hdf5") and path.is_file()
 
 
 def read(path: Path) -> Decoded:
-    """The data set /LF, axes (v, h, y, x, channel), with the cameras of the root's attributes.
+    """Read the data set /LF, axes (v, h, y, x, channel), with the cameras of the root's attributes.
 
     disparity = dH·focalLength/Z − shift, focalLength in pixels. The unit of dH and of the depths is not stated;
-    Blender's, the metre, is taken. Whether h runs to the right is not stated either, and left to parallax.
+    metres, Blender's unit, are assumed. The direction of h is not stated either, and is determined by parallax.
 
     Raises:
-        InputError: no h5py, a file that is not HDF5, is damaged or lacks samples, or one without /LF or its
-            attributes.
+        InputError: no h5py, a file that is not HDF5, is damaged or lacks samples, or lacks /LF or its attributes.
     """
     with hdf5.opened(path) as file:
         samples = hdf5_reading.dataset(file, "LF", path)

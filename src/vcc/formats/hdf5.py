@@ -1,4 +1,4 @@
-"""Opening HDF5 files, with errors that a person understands."""
+"""Opening HDF5 files, with clear error messages."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from vcc.base.errors import InputError
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
 BEGINNINGS = (0, 512)
-"""Where the signature may stand: MATLAB's files begin with a block of their own."""
+"""Possible offsets of the signature: MATLAB's files begin with a block of 512 bytes."""
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 files do, at the start or, as MATLAB's, after a block of 512 bytes."""
+    """Whether a file has the HDF5 signature at its start or, like MATLAB's files, after a block of 512 bytes."""
     with path.open("rb") as file:
         start = file.read(520)
     return any(start[place : place + len(MAGIC)] == MAGIC for place in BEGINNINGS)
 
 
 def library() -> Any:
-    """The module h5py.
+    """Import h5py.
 
     Raises:
-        InputError: it is not installed.
+        InputError: h5py is not installed.
     """
     with checks.package("reading and writing HDF5 files (.mat, .h5)", "h5py", "hdf5"):
         import h5py
@@ -39,7 +39,7 @@ def library() -> Any:
 
 @contextmanager
 def opened(path: Path) -> Iterator[Any]:
-    """An HDF5 file to read from.
+    """Open an HDF5 file for reading.
 
     Raises:
         InputError: no such file, another format, a truncated or damaged file, or no h5py.
@@ -59,17 +59,17 @@ def opened(path: Path) -> Iterator[Any]:
             yield file
     except InputError:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # what h5py says of damaged files
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:  # what h5py raises for damaged files
         raise InputError(
             f"{path} cannot be read: it is truncated or damaged ({error}). Copy it again from where it came from"
         ) from error
 
 
 def number(found: dict[str, Any], name: str, path: Path) -> float:
-    """An attribute that is one number, alone or in an array of one.
+    """An attribute that is a single number, possibly in an array of one.
 
     Raises:
-        InputError: it is not there, or no finite number.
+        InputError: the attribute is missing or not a finite number.
     """
     value = found.get(name)
     if value is None:

@@ -1,8 +1,8 @@
-"""What stands in an HDF5 file: data sets and attributes, whole and of this file, or an error.
+"""Safe reading of data sets and attributes in HDF5 files: complete and from this file only.
 
-HDF5 files may leave things out: a chunk that was never written is read as zeros, one that unpacks to less than its
-size is filled up with whatever was in memory, and data may lie in any other file. None of that is opened here, and
-chunks are therefore unpacked here rather than by the library.
+HDF5 files can be incomplete without an error: a chunk that was never written is read as zeros, a chunk that
+decompresses to less than its size is filled with uninitialised memory, and data may lie in any other file. Such
+files raise here; chunks are therefore decompressed here instead of by the library.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.formats import hdf5, hdf5_texts
 
 _DEFLATE, _SHUFFLE, _FLETCHER32, _LZF = 1, 2, 3, 32000  # registered numbers of filters
-_CHECKSUM = 4  # bytes that Fletcher's checksum has at the end
+_CHECKSUM = 4  # bytes of Fletcher's checksum at the end
 _LARGEST_ATTRIBUTE = 2**16  # elements
 
 
 def found(parent: Any, name: str, path: Path) -> Any:
-    """The group or data set of this name, "a/b" being b in the group a; None if there is none.
+    """The group or data set of this name ("a/b" is b in group a); None if there is none.
 
     Args:
         parent: a group.
-        name: without a slash at its beginning.
-        path: of the file, for messages.
+        name: name without a leading slash.
+        path: path of the file, for messages.
 
     Raises:
-        InputError: a link on the way to another place or another file, or a way through what is no group.
+        InputError: a link to another place or file on the path, or a parent that is not a group.
     """
     h5py = hdf5.library()
     at = parent
     for part in name.split("/"):
         if not isinstance(at, h5py.Group):
-            raise InputError(f"{path}: {at.name} is no group, and {name} should be in it")
+            raise InputError(f"{path}: {at.name} is not a group, so {name} cannot be in it")
         link = at.get(part, getlink=True)
         if link is None:
             return None
@@ -54,25 +54,25 @@ def found(parent: Any, name: str, path: Path) -> Any:
 
 
 def group(parent: Any, name: str, path: Path) -> Any:
-    """The group of this name; None if there is nothing.
+    """The group of this name; None if there is none.
 
     Raises:
-        InputError: there is something else; or as `found`.
+        InputError: the object is not a group; or as in `found`.
     """
-    return _of_kind(hdf5.library().Group, "no group", parent, name, path)
+    return _of_kind(hdf5.library().Group, "not a group", parent, name, path)
 
 
 def dataset(parent: Any, name: str, path: Path) -> Any:
-    """The data set of this name, not read; None if there is nothing.
+    """The data set of this name, without its data; None if there is none.
 
     Raises:
-        InputError: there is something else; or as `found`.
+        InputError: the object is not a data set; or as in `found`.
     """
     return _of_kind(hdf5.library().Dataset, "a group, not a data set", parent, name, path)
 
 
 def _of_kind(kind: type, otherwise: str, parent: Any, name: str, path: Path) -> Any:
-    """What stands under a name, of this kind or ``otherwise`` refused; None if there is nothing."""
+    """The object of this name; raises with ``otherwise`` if it has another kind; None if there is none."""
     at = found(parent, name, path)
     if at is not None and not isinstance(at, kind):
         raise InputError(f"{path}: {name} is {otherwise}")
@@ -80,15 +80,15 @@ def _of_kind(kind: type, otherwise: str, parent: Any, name: str, path: Path) -> 
 
 
 def numbers(data: Any, path: Path) -> NDArray[Any]:
-    """All of a data set of numbers, as they are stored: unsigned and signed integers, floating point.
+    """Read a whole data set of numbers as stored: unsigned and signed integers, floating point.
 
     Args:
-        data: from `dataset`.
-        path: of the file, for messages.
+        data: a data set from `dataset`.
+        path: path of the file, for messages.
 
     Raises:
-        InputError: no numbers, none at all, some that were never written, that are in another file or damaged, or
-            more than a file of this size may hold (`vcc.files.declared_sizes`).
+        InputError: not numbers, empty, data that were never written, are in another file or damaged, or more
+            data than the file's size allows (`vcc.files.declared_sizes`).
     """
     if data.shape is None or data.size == 0 or data.dtype.kind not in "uif" or data.dtype.itemsize > 8:
         raise InputError(f"{path}: {data.name} holds {_kind(data)}, not numbers")
@@ -99,10 +99,10 @@ def numbers(data: Any, path: Path) -> NDArray[Any]:
 
 
 def references(data: Any, path: Path) -> list[Any]:
-    """The objects that a data set of references, MATLAB's cell array, points to.
+    """The objects to which a data set of references (MATLAB's cell array) points.
 
     Raises:
-        InputError: as `numbers`, or a reference to nothing.
+        InputError: as in `numbers`, or a null reference.
     """
     h5py = hdf5.library()
     if data.shape is None or h5py.check_ref_dtype(data.dtype) is not h5py.Reference:
@@ -115,16 +115,16 @@ def attributes(at: Any, path: Path) -> dict[str, Any]:
     """The attributes of a file, group or data set that are numbers or texts.
 
     Raises:
-        InputError: one that claims more than 65,536 elements, or a text that is damaged.
+        InputError: an attribute with more than 65,536 elements, or a damaged text.
     """
     return {text(name): value for name in at.attrs if (value := attribute(at, name, path)) is not None}
 
 
 def attribute(at: Any, name: str | bytes, path: Path) -> Any:
-    """An attribute of a file, group or data set; None if it has none of this name that is a number or a text.
+    """An attribute of a file, group or data set; None if there is no number or text of this name.
 
     Raises:
-        InputError: as `attributes`.
+        InputError: as in `attributes`.
     """
     h5py = hdf5.library()
     if name not in at.attrs:
@@ -146,7 +146,7 @@ def attribute(at: Any, name: str | bytes, path: Path) -> Any:
 
 
 def text(value: Any) -> str:
-    """An attribute as text, however it was written; empty if there is none."""
+    """An attribute as text, in any encoding of the file; empty if None."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     return "" if value is None else str(value)
@@ -159,10 +159,10 @@ def _kind(data: Any) -> str:
 
 
 def _stored(data: Any, path: Path) -> NDArray[Any]:
-    """The elements of a data set, once it is known that all of them are in the file."""
+    """Read the elements of a data set after checking that all of them are in the file."""
     check_declared_size(data.nbytes, path.stat().st_size, f"{path}: {data.name}", LIGHT_FIELD)
     if data.external or data.is_virtual:
-        raise InputError(f"{path}: {data.name} lies in another file, which is not read. Copy it into this one")
+        raise InputError(f"{path}: {data.name} is in another file, which is not read. Copy it into this one")
     if data.chunks is not None:
         return _from_chunks(data, path)
     compact = data.id.get_create_plist().get_layout() == hdf5.library().h5d.COMPACT
@@ -200,7 +200,7 @@ def _from_chunks(data: Any, path: Path) -> NDArray[Any]:
 
 
 def _unpacker(data: Any, path: Path) -> Callable[[bytes, int], NDArray[Any]]:
-    """What makes elements of a chunk's bytes, given which of its filters were left out."""
+    """A function that decodes a chunk's bytes, given the mask of skipped filters."""
     listed = data.id.get_create_plist()
     filters = [listed.get_filter(n)[0] for n in range(listed.get_nfilters())]
     size = math.prod(data.chunks) * data.dtype.itemsize
@@ -223,11 +223,11 @@ def _unpacker(data: Any, path: Path) -> Callable[[bytes, int], NDArray[Any]]:
 
 
 class _Damaged(Exception):
-    """A chunk that cannot be unpacked."""
+    """A chunk that cannot be decoded."""
 
 
 def _undone(number: int, packed: bytes, size: int, width: int) -> bytes:
-    """Bytes of a chunk as they were before a filter; size is that of the chunk, width that of an element."""
+    """Undo a filter on a chunk's bytes; ``size`` is the size of the chunk, ``width`` that of an element."""
     import imagecodecs
 
     if number == _DEFLATE:
@@ -249,6 +249,6 @@ def _undone(number: int, packed: bytes, size: int, width: int) -> bytes:
     if number == _LZF:
         try:
             return bytes(imagecodecs.lzf_decode(packed, out=size + _CHECKSUM))
-        except Exception as error:  # each codec has a type of its own
+        except Exception as error:  # each codec has its own exceptions
             raise _Damaged(f"is damaged ({error}). Copy the file again from where it came from") from None
     raise _Damaged(f"has the filter {number}, which is not known: write it with gzip")

@@ -1,9 +1,9 @@
-"""Texts of any length in the attributes of HDF5 files, read without the library.
+"""Variable-length texts in attributes of HDF5 files, read without the library.
 
-Such a text lies in a collection of its own, and the attribute holds its length and place. The library (up to 2.0)
-stands still for ever at a collection with an object of no length, and takes as much memory as the length says.
-Source of the structure: "HDF5 File Format Specification", version 3.0, The HDF Group: III.E (collections), IV.A.1
-(object headers), IV.A.2.m (attributes).
+Such a text is in a global heap collection, and the attribute contains its length and address. The library (up
+to 2.0) hangs at a collection with an object of length zero, and allocates as much memory as the length states.
+Source of the structure: "HDF5 File Format Specification", version 3.0, The HDF Group: III.E (collections),
+IV.A.1 (object headers), IV.A.2.m (attributes).
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from pathlib import Path
 
 from vcc.formats.hdf5 import BEGINNINGS, MAGIC
 
-_CONTINUED, _ATTRIBUTE = 0x10, 0x0C  # messages of a header
-_SHARED = 2  # flag of a message that lies elsewhere
-_TIMES, _PHASES, _ORDERED = 0x20, 0x10, 0x04  # flags of a header of version 2
-_PLACE = 16  # bytes of a text's length, the address of its collection and its number there
-_HEADER = 16  # of a collection, and of each object in it
+_CONTINUED, _ATTRIBUTE = 0x10, 0x0C  # types of header messages
+_SHARED = 2  # flag of a message stored elsewhere
+_TIMES, _PHASES, _ORDERED = 0x20, 0x10, 0x04  # flags of a version 2 header
+_PLACE = 16  # bytes of a text's length, the address of its collection and its index there
+_HEADER = 16  # bytes: of a collection, and of each object in it
 _MOST_MESSAGES = 10_000
 
 
 class NotReadable(Exception):
-    """What is wrong with a text, in words for people."""
+    """A fault of a text, for messages."""
 
 
 def texts(path: Path, header: int, name: str | bytes, count: int) -> list[str]:
-    """The texts of an attribute.
+    """Read the texts of an attribute.
 
     Args:
         path: the file.
-        header: the address of the object that has the attribute, as the library counts it.
-        name: of the attribute; bytes that are no UTF-8 are themselves.
-        count: how many texts it has.
+        header: address of the object with the attribute, as the library counts it.
+        name: name of the attribute; bytes if it is not UTF-8.
+        count: number of texts.
 
     Raises:
-        NotReadable: it is damaged, or not there.
+        NotReadable: the attribute is damaged or missing.
     """
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         start = next(place for place in BEGINNINGS if data[place : place + len(MAGIC)] == MAGIC)
@@ -52,7 +52,7 @@ def texts(path: Path, header: int, name: str | bytes, count: int) -> list[str]:
 
 
 class _Bytes:
-    """A file's bytes by address, and an error for those that are not there."""
+    """A file's bytes by address; raises for addresses outside the file."""
 
     def __init__(self, data: mmap.mmap, start: int) -> None:
         self._data, self._start = data, start
@@ -60,14 +60,14 @@ class _Bytes:
     def __call__(self, at: int, size: int) -> bytes:
         found = self._data[self._start + at : self._start + at + size] if at < len(self._data) else b""
         if len(found) != size:
-            raise NotReadable("it lies outside of the file")
+            raise NotReadable("it is outside the file")
         return found
 
     def number(self, at: int, size: int) -> int:
         return int.from_bytes(self(at, size), "little")
 
     def find(self, wanted: bytes) -> Iterator[int]:
-        """Where these bytes are."""
+        """Addresses of these bytes."""
         at = self._data.find(wanted, self._start)
         while at >= 0:
             yield at - self._start
@@ -75,13 +75,13 @@ class _Bytes:
 
 
 def _messages(content: _Bytes, header: int) -> Iterator[tuple[int, int]]:
-    """(kind, address) of the messages of a header."""
+    """(type, address) of the messages of a header."""
     blocks, flags = [_first_block(content, header)], 0
     new = content(header, 4) == b"OHDR"
     if new:
         flags = content.number(header + 5, 1)
     count = 0
-    for at, size in blocks:  # grows while it is gone through
+    for at, size in blocks:  # grows during the loop
         end = at + size
         head = (6 if flags & _ORDERED else 4) if new else 8
         while at + head <= end:
@@ -102,7 +102,7 @@ def _messages(content: _Bytes, header: int) -> Iterator[tuple[int, int]]:
 
 
 def _first_block(content: _Bytes, header: int) -> tuple[int, int]:
-    """(address, size) of the messages that stand in a header itself."""
+    """(address, size) of the messages in the header's first block."""
     if content(header, 4) != b"OHDR":
         return header + 16, content.number(header + 8, 4)
     flags = content.number(header + 5, 1)
@@ -112,9 +112,10 @@ def _first_block(content: _Bytes, header: int) -> tuple[int, int]:
 
 
 def _anywhere(content: _Bytes, name: bytes) -> Iterator[int]:
-    """Where in the file messages of an attribute of this name may begin.
+    """Addresses in the file at which messages of an attribute of this name may begin.
 
-    More than eight attributes of an object may lie in a heap of their own (since version 1.8), message by message.
+    If an object has more than eight attributes, they may be in a separate heap (since version 1.8), message by
+    message.
     """
     for at in content.find(name + b"\0"):
         for before in (8, 9):
@@ -123,7 +124,7 @@ def _anywhere(content: _Bytes, name: bytes) -> Iterator[int]:
 
 
 def _data(content: _Bytes, at: int, name: bytes, size: int) -> bytes | None:
-    """So many bytes of the data of an attribute's message; None if it is none of this name."""
+    """The first bytes of the data of an attribute's message; None if the name differs."""
     version = content.number(at, 1)
     sizes = [content.number(at + 2 + 2 * n, 2) for n in range(3)]  # of name, type and shape
     step = 8 if version == 1 else 1
@@ -134,19 +135,19 @@ def _data(content: _Bytes, at: int, name: bytes, size: int) -> bytes | None:
 
 
 def _text(content: _Bytes, place: bytes) -> str:
-    """The text at a place."""
+    """The text at an address in a collection."""
     length, address, number = (int.from_bytes(place[a:b], "little") for a, b in ((0, 4), (4, 12), (12, 16)))
     if length == 0:
         return ""
     if content(address, 4) != b"GCOL":
-        raise NotReadable("its place is none of texts")
+        raise NotReadable("its address is not a collection of texts")
     end = address + content.number(address + 8, 8)
     at = address + _HEADER
     while at + _HEADER <= end:
         found, size = content.number(at, 2), content.number(at + 8, 8)
         if found == number != 0 and length <= size:
             return content(at + _HEADER, length).rstrip(b"\0").decode("utf-8", "replace")
-        if found == 0:  # what follows is free
+        if found == 0:  # the rest is free space
             break
         at += _HEADER + -(-size // 8) * 8
-    raise NotReadable("it is not at its place")
+    raise NotReadable("it is not at its address")

@@ -1,4 +1,4 @@
-"""Writing HDF5 files: whatever goes wrong meanwhile ends the work, and comes out as it is."""
+"""Writing HDF5 files so that any error stops the work and is raised unchanged."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from vcc.base.workers import uninterrupted
 from vcc.formats import hdf5
 
 Put = Callable[..., Any]
-"""``put(group, name, values, **how)`` writes a data set, ``how`` of h5py's ``create_dataset``, and returns it."""
+"""``put(group, name, values, **how)`` writes and returns a data set; ``how`` is for h5py's ``create_dataset``."""
 
 
 def write_file(path: Path, fill: Callable[[Any, Put], None], **options: Any) -> None:
     """Write an HDF5 file.
 
-    The library hands each piece to a function of Python, and drops what that raises.
+    The library passes each block to a Python function and discards exceptions raised there.
 
     Args:
-        path: of the file.
-        fill: called with the file, an `h5py.File`, and with what puts data sets into its groups; in a thread of
-            its own (`vcc.base.workers.uninterrupted`).
-        options: of `h5py.File`.
+        path: path of the file.
+        fill: called with the file, an `h5py.File`, and a function that writes data sets; runs in a separate
+            thread (`vcc.base.workers.uninterrupted`).
+        options: options of `h5py.File`.
 
     Raises:
-        OSError: the disk refuses. The file is then not whole.
-        BaseException: anything that is raised meanwhile; likewise.
+        OSError: the write fails. The file is then incomplete.
+        BaseException: any other exception during writing; likewise.
     """
     state = _State()
     uninterrupted(_filled, path, state, fill, options, end=state.end)
@@ -38,21 +38,21 @@ def write_file(path: Path, fill: Callable[[Any, Put], None], **options: Any) -> 
 
 @dataclass
 class _State:
-    """What ended the work first, if anything did."""
+    """The first exception, if there was one."""
 
     error: BaseException | None = None
 
     def end(self, error: BaseException) -> None:
-        """Have nothing more written."""
+        """Record the exception and stop all further writing."""
         self.error = self.error or error
 
     def check(self) -> None:
-        """Raise what ended the work."""
+        """Raise the recorded exception."""
         if self.error is not None:
             raise self.error
 
     def put(self, group: Any, name: str, values: NDArray[Any], **how: Any) -> Any:
-        """Write a data set chunk by chunk, so that the work can end in between; see `Put`."""
+        """Write a data set chunk by chunk, so that the work can stop in between; see `Put`."""
         made = group.create_dataset(name, values.shape, values.dtype, **how)
         for place in [...] if made.chunks is None else made.iter_chunks():
             self.check()
@@ -71,25 +71,25 @@ def _filled(path: Path, state: _State, fill: Callable[[Any, Put], None], options
 
 
 class _Written(io.FileIO):
-    """A file that keeps what went wrong first, and goes on as if all were well.
+    """A file that records the first exception and then pretends to succeed.
 
-    HDF5 cannot cope with a disk that is full: it fails again for each object that it closes, in words of its own.
+    HDF5 cannot handle a full disk: it fails again for each object that it closes, with its own messages.
     """
 
     state: _State
 
     def write(self, data: Any, /) -> int:
-        """Write all of it."""
+        """Write all bytes, or record the exception."""
         rest = memoryview(data).cast("B")
         try:
             while rest and self.state.error is None:
                 rest = rest[super().write(rest) :]
-        except BaseException as error:  # the library would drop it
+        except BaseException as error:  # the library would discard it
             self.state.end(error)
         return len(data)
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Make it so long."""
+        """Set the length, or record the exception."""
         try:
             return super().truncate(size)
         except BaseException as error:

@@ -1,4 +1,4 @@
-"""What is known of a folder's cameras kept in the folder, in the file that readers look for."""
+"""Saving the cameras of a folder in the folder's camera file."""
 
 from __future__ import annotations
 
@@ -27,27 +27,27 @@ def keep_geometry(
     files_outside: bool = False,
     **options: Any,
 ) -> Path:
-    """Write the cameras of a folder of views as its ``parameters.cfg``: opened again, nothing is assumed.
+    """Write the cameras of a folder of views to its ``parameters.cfg``, so that reopening needs no assumptions.
 
-    What is not given here is taken as `open_light_field` takes it: what the files state, else a default, and a
-    comment in the file says which these are.
+    Values that are not given are taken as in `open_light_field`: from the files, else a default. A comment in
+    the file lists the defaults.
 
     Args:
-        path: the folder. Views may be missing from it.
+        path: the folder; views may be missing.
         spacing: distance between neighbouring views, metres, one number or (dv, du).
         slope_per_pixel: pixel pitch over focal length of the cameras.
-        focus_distance: where the views converge, metres; ``math.inf`` if they are parallel.
+        focus_distance: distance at which the views converge, metres; ``math.inf`` if they are parallel.
         views: (rows, columns) of views, for running numbers.
-        order: of running numbers.
+        order: order of running numbers.
         files_outside: see `open_light_field`.
-        options: of other formats; a folder takes none.
+        options: not supported for folders; any option raises.
 
     Returns:
         The file that was written.
 
     Raises:
-        InputError: a file, which has no place for it; a folder with a camera file already, or whose files state
-            all where nothing is given; a folder that cannot be written to; what `open_light_field` refuses.
+        InputError: the path is a file; a folder that already has a camera file, or whose files state everything
+            and no value is given; a folder that is not writable; or as in `open_light_field`.
     """
     folder = expanded(path)
     with reading(folder, "a folder of views"):
@@ -63,23 +63,23 @@ def keep_geometry(
 def _refuse_a_file(folder: Path) -> None:
     if containers.container_of(folder) is not None:
         raise InputError(
-            f"{folder} is one file, beside which no camera file is read: make a store of it, which states its "
-            "cameras (vcc convert, or vcc.store.save_store)"
+            f"{folder} is a single file, for which no camera file is read: convert it to a store, which states "
+            "its cameras (vcc convert, or vcc.store.save_store)"
         )
 
 
 def _text(grid: ViewGrid, folder: Path, given: Given) -> str:
-    """What ``parameters.cfg`` of a folder is to say."""
+    """The text of ``parameters.cfg`` for a folder."""
     there = hci.parameters_file(folder)
     if there is not None:
-        raise InputError(f"{there} states the cameras already: correct what it says, or move it away first")
+        raise InputError(f"{there} states the cameras already: correct it, or move it away first")
     info = info_of_grid(grid)
     if not info.unknown and not given.names:
         raise InputError(
             f"{folder}: its files ({info.format}) state all of its cameras, so there is nothing to keep"
         )
     cameras = cameras_for(info, grid.geometry, given, folder)
-    assert cameras is not None  # no folder states a frame
+    assert cameras is not None  # folders never state a frame
     text = hci.parameters_text(
         grid.shape,
         (info.height, info.width),
@@ -90,5 +90,5 @@ def _text(grid: ViewGrid, folder: Path, given: Given) -> str:
     )
     assumed = [name for name in info.unknown if name not in given.names]
     if assumed:
-        text = f"# Assumed, since neither the files nor anybody said it: {', '.join(assumed)}\n{text}"
+        text = f"# Assumed, because neither the files nor the user stated them: {', '.join(assumed)}\n{text}"
     return text

@@ -1,9 +1,9 @@
 """Light fields of the Light Field Toolbox for MATLAB (Dansereau): ``.mat`` of version 7.3, which is HDF5.
 
-``LF`` has MATLAB's axes [j, i, l, k, channel], a fourth channel being a weight; HDF5 shows them reversed.
-Rectified light fields come with the intrinsics H of Dansereau, Pizarro and Williams (CVPR 2013): [s, t, u, v, 1]ᵀ
-= H·[i, j, k, l, 1]ᵀ, indices from 1, s, t places in metres and u, v slopes towards the scene. A ray that leaves
-towards the scene with slope u comes from it with ours of −u.
+``LF`` has MATLAB's axes [j, i, l, k, channel], with a weight as fourth channel; HDF5 reverses them. Rectified
+light fields contain the intrinsics H of Dansereau, Pizarro and Williams (CVPR 2013): [s, t, u, v, 1]ᵀ = H·[i,
+j, k, l, 1]ᵀ, indices from 1, s and t positions in metres, u and v slopes towards the scene. A slope u towards
+the scene is a slope −u of the light in this package.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ _CLASSES = {"uint8": "uint8", "uint16": "uint16", "uint32": "uint32", "float32":
 
 
 def recognised(path: Path) -> bool:
-    """Whether the name is one of a MATLAB file."""
+    """Whether the extension is that of a MATLAB file."""
     return path.suffix.lower() == ".mat" and path.is_file()
 
 
 def read(path: Path) -> Decoded:
-    """The light field ``LF`` with its weights and, if it was rectified, its full frame.
+    """Read the light field ``LF`` with its weights and, if it was rectified, its full frame.
 
-    Decoded and not colour-corrected samples are linear; those that DecodeOptions calls colour-corrected have been
-    through a gamma and are taken as sRGB.
+    Decoded samples without colour correction are linear. Samples that DecodeOptions marks as colour-corrected
+    are gamma-encoded and are assumed to be sRGB.
 
     Raises:
-        InputError: no h5py, a .mat of an earlier version, a damaged file, one without ``LF``, or intrinsics that
-            are no 5×5 matrix.
+        InputError: no h5py, a .mat of an earlier version, a damaged file, a file without ``LF``, or intrinsics
+            that are not a 5×5 matrix.
     """
     with hdf5.opened(path) as file:
         samples = hdf5_reading.dataset(file, "LF", path)
@@ -99,14 +99,14 @@ def read(path: Path) -> Decoded:
 
 
 def frame_of(intrinsics: NDArray[Any], where: Path | str = "the intrinsics") -> Affine:
-    """The frame, indices from 0, of the toolbox's intrinsics H.
+    """The frame, indices from 0, for the toolbox's intrinsics H.
 
     Args:
         intrinsics: H, 5×5.
-        where: how to name it in an error.
+        where: name of the source in an error.
 
     Raises:
-        InputError: not 5×5, not finite, or not invertible.
+        InputError: H is not 5×5, not finite, or not invertible.
     """
     matrix = np.asarray(intrinsics, dtype=np.float64)
     if matrix.shape != (5, 5) or not np.isfinite(matrix).all():
@@ -120,24 +120,24 @@ def frame_of(intrinsics: NDArray[Any], where: Path | str = "the intrinsics") -> 
 
 
 def intrinsics_of(frame: Affine) -> NDArray[np.float64]:
-    """The toolbox's intrinsics H, 5×5, of a light field's frame."""
+    """The toolbox's intrinsics H, 5×5, for a light field's frame."""
     matrix: NDArray[np.float64] = _TURNED @ (frame @ Affine.translation(-1, -1, -1, -1)).matrix
     return matrix
 
 
 def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
-    """Write a light field as the Light Field Toolbox does, with its frame as RectOptions.RectCamIntrinsicsH.
+    """Write a light field in the toolbox's format, with its frame as RectOptions.RectCamIntrinsicsH.
 
     Samples keep their type and are linear. MATLAB reads the file with ``load``.
 
     Args:
-        light_field: what to write.
-        path: where to; ends in .mat.
-        weights: 0 (unknown) to 1 of each sample, shape (v, u, t, s), as a further channel.
+        light_field: the light field.
+        path: path to write to; ends in .mat.
+        weights: weight of each sample, 0 (unknown) to 1, shape (v, u, t, s), stored as a further channel.
 
     Raises:
-        InputError: another ending, no h5py, a sample type that MATLAB's files do not have, weights of another
-            shape, or a place that cannot be written to.
+        InputError: another extension, no h5py, a sample type that MATLAB's files do not support, weights of
+            another shape, or a path that is not writable.
     """
     path = Path(path).expanduser()
     checks.ending("a light field of the Light Field Toolbox", path, ".mat")
@@ -169,7 +169,7 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
     with atomic_path(path) as temporary:
         write_file(temporary, fill, userblock_size=512)
         with temporary.open("r+b") as raw:
-            # Text, no subsystem, version 2.0 and the byte order: what MATLAB looks at before it calls HDF5.
+            # Text, no subsystem, version 2.0 and byte order: MATLAB checks this header before it calls HDF5.
             raw.write(_HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM")
     return path
 
@@ -181,7 +181,7 @@ def _struct(file: Any, name: str) -> Any:
 
 
 def _variable(put: Put, group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
-    """A variable as MATLAB stores it: its axes reversed, its class in an attribute."""
+    """Write a variable as MATLAB stores it: reversed axes, class as an attribute."""
     made = put(group, name, values, **how)
     made.attrs["MATLAB_class"] = np.bytes_(kind or _CLASSES[values.dtype.name])
     if kind == "char":
@@ -195,7 +195,7 @@ def _numbers(file: Any, name: str, path: Path) -> NDArray[Any] | None:
 
 
 def _disparities(stated: NDArray[Any] | None, path: Path) -> tuple[float, float] | None:
-    """The lowest and the highest disparity of a variable; None if there is none."""
+    """The lowest and highest disparity in a variable; None if there is none."""
     if stated is None:
         return None
     given = [float(value) for value in stated.ravel()[:3]]
@@ -205,7 +205,7 @@ def _disparities(stated: NDArray[Any] | None, path: Path) -> tuple[float, float]
 
 
 def _text(file: Any, name: str, path: Path) -> str:
-    """The text, or texts in a cell array, of a variable; empty if there is none."""
+    """The text of a variable, or the texts of a cell array; empty if there is none."""
     data = hdf5_reading.dataset(file, name, path)
     if data is None:
         return ""
@@ -214,7 +214,7 @@ def _text(file: Any, name: str, path: Path) -> str:
 
 
 def _characters(data: Any, path: Path) -> str:
-    """MATLAB's text: a number of 8 or 16 bits for a character."""
+    """Decode MATLAB's text: a number of 8 or 16 bits for each character."""
     codes = hdf5_reading.numbers(data, path)
     if codes.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{path}: {data.name} should be text, and holds numbers of type {codes.dtype}")

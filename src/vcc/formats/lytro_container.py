@@ -1,6 +1,6 @@
-"""The container of Lytro's files, ``.lfp`` and ``.lfr``: sections found by walking, their bytes checked.
+"""The container of Lytro's files, ``.lfp`` and ``.lfr``: its sections, with checked bytes.
 
-It is a header, a table of contents in JSON and blobs that the table calls by their SHA-1::
+A container is a header, a table of contents in JSON, and blobs that the table names by their SHA-1::
 
     89 4C 46 50 0D 0A 1A 0A  00 00 00 01  00 00 00 00    the file begins
     89 4C 46 4D 0D 0A 1A 0A  00 00 00 00                 the table of contents; 43 for 4D: a blob
@@ -29,7 +29,7 @@ _ALIGNMENT = 16
 
 
 def begins_as_container(path: Path) -> bool:
-    """Whether the first bytes of a file are those of a container; False for one that cannot be read."""
+    """Whether a file begins with the signature of a container; False for an unreadable file."""
     try:
         with path.open("rb") as file:
             return file.read(len(_FILE)) == _FILE
@@ -38,7 +38,7 @@ def begins_as_container(path: Path) -> bool:
 
 
 class Container:
-    """The sections of a file, found by walking through their headers; their bytes are read when asked for."""
+    """The sections of a file, located by their headers; their bytes are read on access."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -59,7 +59,7 @@ class Container:
         self._file.close()
 
     def fault(self, words: str) -> InputError:
-        """What is wrong with this file, to be raised."""
+        """An `InputError` for this file."""
         return InputError(f"{self.path}: {words}")
 
     def contents(self) -> dict[str, Any]:
@@ -67,11 +67,11 @@ class Container:
         return self.json(self._contents, "its table of contents")
 
     def length_of(self, name: str) -> int | None:
-        """How many bytes a section has; None if it is not in the file."""
+        """Length of a section in bytes; None if it is not in the file."""
         return self._blobs[name][1] if name in self._blobs else None
 
     def bytes_of(self, name: str, what: str) -> bytes:
-        """The bytes of a section, whose SHA-1 is its name."""
+        """The bytes of a section, checked against the SHA-1 in its name."""
         if name not in self._blobs:
             raise self.fault(f"{what} ({name}) is not in the file. Copy it again from where it came from")
         start, length = self._blobs[name]
@@ -84,16 +84,16 @@ class Container:
         return data
 
     def json(self, name: str, what: str) -> dict[str, Any]:
-        """The JSON object that a section holds."""
+        """The JSON object in a section."""
         return read_json(self.bytes_of(name, what).rstrip(b"\0"), f"{self.path}: {what}")
 
     def _walk(self) -> str:
-        """Find all sections; returns the name of the table of contents."""
+        """Locate all sections; returns the name of the table of contents."""
         header = self._file.read(_FILE_HEADER)
         if header[: len(_FILE)] != _FILE:
             raise self.fault(
                 f"it begins with {header[:8].hex(' ').upper() or 'nothing'}, not with "
-                f"{_FILE.hex(' ').upper()}, so it is no container of a Lytro camera"
+                f"{_FILE.hex(' ').upper()}, so it is not a container of a Lytro camera"
             )
         place, contents = _FILE_HEADER, None
         while place < self._size:
@@ -101,9 +101,9 @@ class Container:
             header = self._file.read(_SECTION_HEADER)
             if header[:8] not in (_CONTENTS, _BLOB):
                 if not header.strip(b"\0"):
-                    break  # padding behind the last section
+                    break  # padding after the last section
                 raise self.fault(
-                    f"at byte {place:,} stands {header[:8].hex(' ').upper()}, and no section begins so"
+                    f"byte {place:,} begins with {header[:8].hex(' ').upper()}, not the start of a section"
                 )
             length = int.from_bytes(header[12:16], "big")
             start = place + _SECTION_HEADER

@@ -1,9 +1,9 @@
 """Recordings of Lytro cameras, ``.lfp`` and ``.lfr``: the raw mosaic behind the microlenses, and the camera's
-account of itself.
+metadata.
 
-Such a file holds no light field yet: its mosaic must first be decoded, microlens by microlens.
-`read_lytro` gives the mosaic and what is needed for that; `read`, which `vcc.open_light_field` calls,
-refuses and says so.
+Such a file is not yet a light field: its mosaic must first be decoded, microlens by microlens. `read_lytro`
+returns the mosaic and the data needed for decoding; `read`, called by `vcc.open_light_field`, raises with this
+explanation.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ _MADE = {
     "depthMap": "a depth map",
     "edofParallax": "pictures from several sides",
 }
-"""What Lytro's programs make of a recording, by the end of its type's name, com.lytro.acceleration.…"""
+"""Products of Lytro's programs, by the last part of the type's name, com.lytro.acceleration.…"""
 _CORNERS = {"r": "RGGB", "gr": "GRBG", "gb": "GBRG", "b": "BGGR"}
-"""What colour the upper left pixel has, and the tile that this makes."""
+"""The tile of the colour filter for each colour of the upper left pixel."""
 _PLACES = {"RGGB": ("r", "gr", "gb", "b"), "GRBG": ("gr", "r", "b", "gb")}
 _PLACES |= {"BGGR": ("b", "gb", "gr", "r"), "GBRG": ("gb", "b", "r", "gr")}
-"""The kinds of pixel of a tile, row by row."""
+"""The types of the pixels of a tile, row by row."""
 
 
 @dataclass(frozen=True)
 class _Packing:
-    """How a camera packs its pixels, and what it is."""
+    """Pixel packing and size of a camera."""
 
     camera: str
     bits: int
@@ -57,16 +57,16 @@ _PACKINGS = (
 
 @dataclass(frozen=True)
 class LytroGeometry:
-    """What a file states of the camera's optics; None for what it does not state.
+    """Optics of the camera as stated by a file; None for unknown values.
 
     Args:
         lens_pitch: distance between the centres of neighbouring microlenses, metres.
-        lens_rotation: of the grid of microlenses against the grid of pixels, radians.
-        lens_height: of the microlenses above the sensor, metres.
-        pixel_pitch: of the sensor, metres.
-        focal_length: of the main lens as it was zoomed, metres.
-        f_number: of the main lens.
-        exit_pupil_distance: of the main lens's exit pupil from the microlenses, metres.
+        lens_rotation: rotation of the microlens grid relative to the pixel grid, radians.
+        lens_height: height of the microlenses above the sensor, metres.
+        pixel_pitch: pixel pitch of the sensor, metres.
+        focal_length: focal length of the main lens at its zoom position, metres.
+        f_number: f-number of the main lens.
+        exit_pupil_distance: distance of the main lens's exit pupil from the microlenses, metres.
     """
 
     lens_pitch: float | None = field(default=None, metadata={"unit": "length"})
@@ -80,19 +80,19 @@ class LytroGeometry:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LytroRaw(Brief):
-    """A raw recording of a Lytro camera: numbers proportional to light, one colour a pixel, behind microlenses.
+    """A raw recording of a Lytro camera: linear numbers, one colour per pixel, behind microlenses.
 
     Args:
         mosaic: the numbers as recorded, uint16, shape (rows, columns), 0 to 2^bits − 1.
-        bits: of each number: 10 (Illum) or 12 (F01).
+        bits: bits of a number: 10 (Illum) or 12 (F01).
         color_filter: the colours of a tile of 2×2 pixels, row by row, like "GRBG".
-        camera: its make and model, for people.
-        geometry: of microlenses and main lens.
-        black: the number that stands for no light, of the four pixels of a tile, row by row; None if not stated.
-        white: the number that stands for a full pixel, likewise.
+        camera: make and model, for people.
+        geometry: geometry of microlenses and main lens.
+        black: black level of the four pixels of a tile, row by row; None if not stated.
+        white: white level of the four pixels, likewise.
         color_matrix: 3×3, from the camera's linear red, green and blue to linear sRGB; None if not stated.
-        metadata: all that the file states of the picture, as its JSON has it.
-        private_metadata: the same of the camera itself (serial numbers); empty if not there.
+        metadata: metadata of the picture, as in the file's JSON.
+        private_metadata: metadata of the camera (serial numbers); empty if missing.
     """
 
     mosaic: NDArray[np.uint16]
@@ -109,7 +109,7 @@ class LytroRaw(Brief):
     def linear(self) -> NDArray[np.float32]:
         """The mosaic as light: 0 at the black level, 1 at the white level; noise may be below, highlights above.
 
-        Where the file states no levels, black is 0 and white 2^bits − 1.
+        If the file states no levels, black is 0 and white 2^bits − 1.
 
         Returns:
             float32, shape (rows, columns).
@@ -125,14 +125,14 @@ class LytroRaw(Brief):
 
 
 def unpack(packed: bytes, bits: int, shape: tuple[int, int]) -> NDArray[np.uint16]:
-    """The pixels of a packed mosaic.
+    """Unpack the pixels of a packed mosaic.
 
-    10 bits, little-endian (Illum): of every 5 bytes four hold the high bits of a pixel each, and the fifth the low
-    two bits of all, the first pixel's lowest. 12 bits, big-endian (F01): every 3 bytes hold 2 pixels, high bits
-    first.
+    10 bits, little-endian (Illum): of every 5 bytes, four contain the high bits of a pixel each, and the fifth
+    the low two bits of all four, with the first pixel lowest. 12 bits, big-endian (F01): every 3 bytes contain
+    2 pixels, high bits first.
 
     Args:
-        packed: the bytes.
+        packed: the packed bytes.
         bits: 10 or 12.
         shape: (rows, columns).
 
@@ -140,7 +140,7 @@ def unpack(packed: bytes, bits: int, shape: tuple[int, int]) -> NDArray[np.uint1
         uint16, shape (rows, columns).
 
     Raises:
-        InputError: other bits, or a number of bytes or pixels that does not fit.
+        InputError: other bits, or a wrong number of bytes or pixels.
     """
     if bits not in (10, 12):
         raise InputError(f"a packed mosaic has 10 or 12 bits a pixel, not {bits}")
@@ -165,16 +165,16 @@ def unpack(packed: bytes, bits: int, shape: tuple[int, int]) -> NDArray[np.uint1
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is meant to be such a container, by its ending or its first bytes."""
+    """Whether the path is such a container, by its extension or its first bytes."""
     return path.is_file() and (path.suffix.lower() in ENDINGS or begins_as_container(path))
 
 
 def read(path: Path) -> Decoded:
-    """Refuse: a raw recording is no light field yet.
+    """Raise: a raw recording is not a light field.
 
     Raises:
-        InputError: always; of a damaged file what `read_lytro` says, of a sound one what it holds and
-            how to get it.
+        InputError: always; for a damaged file as in `read_lytro`, otherwise a description of the content and
+            how to decode it.
     """
     with Container(Path(path)) as container:
         image = _Recording(container)
@@ -188,15 +188,15 @@ def read(path: Path) -> Decoded:
 
 
 def read_lytro(path: str | PathLike[str]) -> LytroRaw:
-    """The raw recording in a container of a Lytro camera.
+    """Read the raw recording in a container of a Lytro camera.
 
     Args:
         path: an ``.lfp``, ``.lfr`` file.
 
     Raises:
-        InputError: no such file, a wrong magic number, missing or damaged bytes, a container without a raw
-            recording (Lytro's web files hold only pictures made of one), metadata that cannot be understood, or
-            an unknown packing.
+        InputError: no such file, a wrong signature, missing or damaged bytes, a container without a raw
+            recording (Lytro's web files contain only derived pictures), invalid metadata, or an unknown
+            packing.
     """
     path = expanded(path)
     with reading(path, "a raw recording of a Lytro camera"), Container(path) as container:
@@ -216,7 +216,7 @@ def read_lytro(path: str | PathLike[str]) -> LytroRaw:
 
 
 class _Recording:
-    """The raw picture of a container: what its metadata state, with the metadata's own names hidden here."""
+    """The raw picture of a container, with access to its metadata."""
 
     def __init__(self, container: Container) -> None:
         self._container = container
@@ -234,7 +234,7 @@ class _Recording:
         return self._container.bytes_of(self._image_name, "its picture")
 
     def geometry(self) -> LytroGeometry:
-        """The devices' geometry."""
+        """Geometry of microlenses, sensor and lens."""
         return LytroGeometry(
             lens_pitch=self._length("devices", "mla", "lensPitch"),
             lens_rotation=self._number("devices", "mla", "rotation"),
@@ -258,7 +258,7 @@ class _Recording:
         return None
 
     def color_matrix(self) -> NDArray[np.float64] | None:
-        """From the camera's colours to sRGB."""
+        """Matrix from the camera's colours to sRGB."""
         for name in ("ccm", "ccmRgbToSrgbArray"):
             given = value_at(self.metadata, "image", "color", name)
             if given is None:
@@ -268,7 +268,7 @@ class _Recording:
             except (TypeError, ValueError):
                 matrix = np.full((3, 3), np.nan)
             if not np.isfinite(matrix).all():
-                raise self._container.fault(f"image.color.{name} of its metadata is no matrix of 3×3 numbers")
+                raise self._container.fault(f"image.color.{name} of its metadata is not a matrix of 3×3 numbers")
             return matrix
         return None
 
@@ -286,7 +286,7 @@ class _Recording:
 
     @staticmethod
     def _images() -> tuple[tuple[str, ...], ...]:
-        """Where the metadata may speak of pixels: directly (Illum) or among details of the raw data (F01)."""
+        """Locations of pixel data in the metadata: top level (Illum) or in details of the raw data (F01)."""
         return ("image",), ("image", "rawDetails")
 
     def _stated(self, *keys: str) -> Any:
@@ -297,7 +297,7 @@ class _Recording:
         return None
 
     def _packing(self, length: int | None) -> tuple[int, tuple[int, int], _Packing]:
-        """Bits, shape, and the camera that packs so; from what is stated, and else from the number of bytes."""
+        """Bits, shape and packing of the camera, from the metadata or else from the number of bytes."""
         fault = self._container.fault
         if length is None:
             raise fault(
@@ -357,7 +357,7 @@ class _Recording:
         return number
 
     def _length(self, *keys: str) -> float | None:
-        """A number above 0, in metres if it is a length."""
+        """A number that must be above 0, in metres if it is a length."""
         value = self._number(*keys)
         if value is not None and not value > 0:
             raise self._container.fault(
@@ -367,10 +367,10 @@ class _Recording:
 
 
 def _frame(container: Container) -> dict[str, Any]:
-    """The names of a container's picture and metadata.
+    """The references to a container's picture and metadata.
 
-    What Lytro's programs make of a recording (a refocus stack, …-stk.lfp; a depth map, …-dm.lfp; an Illum's
-    picture for the web) lists it as its frame, and does not hold it.
+    Derived files of Lytro's programs (a refocus stack, …-stk.lfp; a depth map, …-dm.lfp; an Illum's picture for
+    the web) list the recording as their frame but do not contain it.
     """
     contents = container.contents()
     for keys in (("frames",), ("picture", "frameArray")):
@@ -387,7 +387,7 @@ def _frame(container: Container) -> dict[str, Any]:
 
 
 def _made_of_it(contents: dict[str, Any]) -> list[str]:
-    """What a container says that it holds besides, or instead of, a recording."""
+    """The derived products that a container lists."""
     found = [value_at(contents, *keys) for keys in (("accelerations",), ("picture", "accelerationArray"))]
     kinds = [
         each.get("type") for some in found if isinstance(some, list) for each in some if isinstance(each, dict)
@@ -396,7 +396,7 @@ def _made_of_it(contents: dict[str, Any]) -> list[str]:
 
 
 def _is_there(container: Container, frame: dict[str, Any], made: list[str]) -> bool:
-    """Whether a frame is in the file, or missing from one that nothing was made of: then that one is damaged."""
+    """Whether a frame is in the file, or is missing from a file without derived products (then damaged)."""
     names = [frame.get(key) for key in ("imageRef", "metadataRef")]
     missing = [isinstance(name, str) and container.length_of(name) is None for name in names]
     return not (all(missing) or (missing[0] and made))

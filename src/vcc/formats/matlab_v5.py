@@ -1,7 +1,7 @@
-"""MATLAB's .mat before version 7.3, unpacked no further than its bytes may hold.
+"""MATLAB's .mat before version 7.3, with a limit on the decompressed size.
 
-Structure: "MAT-File Format", The MathWorks, chapter 1: a header of 128 bytes, then elements of a type, a length
-and so many bytes; those of type 15 are elements packed with zlib.
+Structure: "MAT-File Format", The MathWorks, chapter 1: a header of 128 bytes, then elements with a type, a
+    length and data; elements of type 15 are compressed with zlib.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ _PACKED = 15
 
 
 def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays of a file by their names.
+    """Read the arrays of a file by name.
 
     Raises:
-        Exception: of any type; what is wrong.
+        Exception: of any type, if the file is damaged.
     """
     from scipy.io import loadmat
 
@@ -33,10 +33,10 @@ def read_matlab(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """The same file with nothing packed: then nothing is larger than it."""
+    """The same file with all elements decompressed, so that nothing can exceed its size."""
     order: Any = _BYTE_ORDERS.get(data[126:128])
     if order is None:
-        return data  # of version 4, which packs nothing; or no such file, as the library says
+        return data  # version 4, which has no compression; or another format, which the library reports
     parts, place, left = [data[:_HEADER]], _HEADER, LIGHT_FIELD
     while place + 8 <= len(data):
         kind, length = (int.from_bytes(data[at : at + 4], order) for at in (place, place + 4))

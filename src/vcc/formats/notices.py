@@ -1,4 +1,4 @@
-"""What a person is told of a light field that was opened."""
+"""Notices for the user on an opened light field."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from vcc.formats.orientation import VISIBLE_DISPARITY
 
 
 def assumed_notice(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequence[str]) -> str:
-    """What had to be assumed, and how to state it; empty for nothing.
+    """Notice on assumed quantities and how to state them; empty if there are none.
 
     Args:
-        info: what the folder or file holds.
-        path: which it is.
-        stated: what its format states of the cameras.
-        assumed: names of what neither it nor the user says.
+        info: content of the folder or file.
+        path: path of the folder or file.
+        stated: geometry stated by the format.
+        assumed: names of the quantities that neither the format nor the user states.
     """
     if not assumed:
         return ""
@@ -33,39 +33,39 @@ def assumed_notice(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequ
         "focus_distance": "focus_distance=inf (parallel views)",
     }
     return (
-        f"the files ({info.format}) do not state {', '.join(assumed)}; taken are "
-        f"{', '.join(texts[name] for name in assumed)}. Distances and blur are only as right as these: "
+        f"the files ({info.format}) do not state {', '.join(assumed)}; assumed are "
+        f"{', '.join(texts[name] for name in assumed)}. Distances and blur are only as accurate as these: "
         f"pass {', '.join(f'{name}=…' for name in assumed)} (lengths in metres) if you know better"
         f"{_how_to_keep(info, path)}"
     )
 
 
 FAR_FROM_STATED = 0.2
-"""Share by which what is given may differ from what files state without a word: measured again, it does."""
+"""Relative difference between given and stated values below which there is no notice: remeasured values differ."""
 
 
 def overruled_notice(info: FolderInfo, given: Given) -> str:
-    """What is given and far from what the files state, a slip of units most often; empty for nothing.
+    """Notice on given values far from those of the files, usually a wrong unit; empty if there are none.
 
     Args:
-        info: what the folder or file holds.
-        given: what the user says of the cameras.
+        info: content of the folder or file.
+        given: values given by the user.
     """
     parts = []
     for name in given.names:
         wanted, stated = (max(np.atleast_1d(getattr(each, name))) for each in (given, info))
-        if name in info.unknown or math.isinf(wanted) or math.isinf(stated):  # pictures may be shifted on purpose
+        if name in info.unknown or math.isinf(wanted) or math.isinf(stated):  # pictures may be shifted
             continue
         if not math.isclose(wanted, stated, rel_tol=FAR_FROM_STATED):
             unit = "" if name == "slope_per_pixel" else " m"
             parts.append(f"{name} is {stated:.4g}{unit} by the files and {wanted:.4g}{unit} as given")
     if not parts:
         return ""
-    return f"{'; '.join(parts)}: taken is what is given. Leave it out to take what the files state"
+    return f"{'; '.join(parts)}: the given value is used. Leave it out to use the value of the files"
 
 
 def _how_to_keep(info: FolderInfo, path: Path) -> str:
-    """Folders can keep it, files cannot."""
+    """Hint on saving the values, for folders only."""
     return (
         f'. vcc info "{path}" --keep writes them into the folder, and nothing is assumed again'
         if info.files
@@ -81,10 +81,11 @@ def _spacing_text(info: FolderInfo, unit: str) -> str:
 
 
 def vergence_notice(shown: tuple[float, float] | None) -> str:
-    """A word on negative disparities, which parallel cameras cannot see.
+    """Notice on negative disparities, which are impossible for parallel cameras.
 
     Args:
-        shown: (lowest, highest), pixels per view, that views taken as parallel show; None for no parallax.
+        shown: measured (lowest, highest), pixels per view, for views assumed parallel; None if there is no
+            parallax.
     """
     if shown is None or shown[0] > -VISIBLE_DISPARITY:
         return ""

@@ -1,4 +1,4 @@
-"""Views that are only numbered, ``frame_017.png``: in rows or columns, all in one direction or to and fro."""
+"""Views that are only numbered, ``frame_017.png``: by rows or columns, in one direction or serpentine."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def find(
     """The grid of the folder's pictures with running numbers; None if there are none.
 
     Args:
-        folder: where the pictures are; others without a number are left alone.
-        views: (rows, columns). Not given, it is found from the pictures, which are read for it: in the right
+        folder: folder of the pictures; pictures without a number are ignored.
+        views: (rows, columns). By default detected from the pictures, which are read for this: in the right
             arrangement neighbours differ least.
-        order: see `vcc.formats.orders`. Found likewise.
-        sparse: allow numbers that are missing.
+        order: see `vcc.formats.orders`; detected likewise.
+        sparse: allow missing numbers.
 
     Raises:
-        InputError: several sets of numbered pictures, numbers missing, a number of pictures that is not that of
-            the views, or an arrangement that the pictures do not tell clearly.
+        InputError: several sets of numbered pictures, missing numbers, a number of pictures that does not match
+            the views, or an arrangement that is not clear from the pictures.
     """
     numbered = _numbered(folder)
     if len(numbered) < 2:
@@ -53,7 +53,7 @@ def find(
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
-    """The largest set of pictures whose names differ in one number only."""
+    """The set of pictures whose names differ in one number only; empty if there is none."""
     sets: dict[str, dict[int, Path]] = defaultdict(dict)
     for file in pictures_in(folder):
         match = _NAME.fullmatch(file.stem)
@@ -80,7 +80,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
 def _line(
     numbered: dict[int, Path], views: tuple[int, int] | None, folder: Path, sparse: bool
 ) -> list[Path | None]:
-    """The files in the order of their numbers, None for those missing."""
+    """The files in the order of their numbers, with None for missing ones."""
     first, last = min(numbered), max(numbered)
     step = math.gcd(*(number - first for number in numbered)) or 1
     span = (last - first) // step + 1
@@ -92,13 +92,13 @@ def _line(
     if span < count and (first != 0 or step != 1):
         raise InputError(
             f"{folder} has {len(numbered)} of {count} numbered views, from {first} to {last}, and which of the "
-            "others are missing cannot be known. Add them, or list those that there are in a views.csv"
+            "others are missing is unknown. Add them, or list the existing views in a views.csv"
         )
     missing = count - len(numbered)
     if missing and (not sparse or count > MOST_PLACES):
         named = (number for number in range(first, first + count * step, step) if number not in numbered)
         verb = "is" if missing == 1 else "are"
-        way_out = "Add them, or open those that there are with vcc.formats.open_sparse_views"
+        way_out = "Add them, or open the existing views with vcc.formats.open_sparse_views"
         raise InputError(
             f"{folder} has {len(numbered)} of {count} numbered views; {missing} {verb} missing: "
             f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"

@@ -1,4 +1,4 @@
-"""Orders in which the views of a grid are counted, and which of them pictures tell.
+"""Orders in which the views of a grid are counted, and detection of the order from the pictures.
 
 The numbers of 3×4 views::
 
@@ -7,9 +7,9 @@ The numbers of 3×4 views::
     4  5  6  7   1 4 7 10       7 6  5  4    1 4 7 10             8 2  9  3
     8  9 10 11   2 5 8 11       8 9 10 11    2 3 8  9             4 10 5 11
 
-Row by row and to and fro are the raster and serpentine scans by which JPEG Pleno's tools make videos of views, and
-gantries go to and fro. Chess has all fields of one colour before those of the other, as where one half of the
-views is to be had first and the rest comes after.
+The raster and serpentine orders are those in which JPEG Pleno's tools make videos of views; gantries use
+serpentine. Chess has all fields of one colour before the other, for transmissions in which half of the views
+come first.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 
 Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns", "chess"]
-"""How views are counted: row by row from the left; column by column from the top; every other row, or column,
-backwards; all fields of a chessboard that have the upper left one's colour, row by row, and then the others.
+"""Order of counting: row by row from the left; column by column from the top; every other row, or column,
+reversed; all fields of a chessboard with the colour of the upper left one, row by row, then the others.
 """
 ORDERS: tuple[Order, ...] = get_args(Order)
 
-_THUMBNAIL = 24  # pixels: parallax is then a small part of a feature, and differences grow with it
-_CLEARLY = 1.1  # by this factor the best arrangement must beat the next
-_LINE = 1.5  # and a single row of views the best grid
-_MOST = 4096  # views of which each is compared with each, within seconds
+_THUMBNAIL = 24  # pixels: parallax is then small against a feature, and differences grow with it
+_CLEARLY = 1.1  # minimum ratio between the second-best and the best arrangement
+_LINE = 1.5  # and between the best grid and a single row of views
+_MOST = 4096  # maximum number of views for pairwise comparison within seconds
 
 
 def check(views: object, order: object) -> None:
-    """Refuse what is neither None nor (rows, columns), and neither None nor an order.
+    """Raise unless views are None or (rows, columns), and order is None or an order.
 
     Raises:
-        InputError: that.
+        InputError: an invalid value.
     """
     if order is not None:
         checks.one_of("order", order, ORDERS)
@@ -69,7 +69,7 @@ def running_numbers(views: tuple[int, int], order: Order) -> NDArray[np.intp]:
 
 
 def counted_from(views: tuple[int, int], order: Order) -> tuple[int, int]:
-    """The (rows, columns) as which views of an order are written by someone who takes columns for rows."""
+    """The (rows, columns) of the row-wise order that an order corresponds to: transposed for orders by column."""
     return views[::-1] if order in ("column-major", "serpentine-columns") else views
 
 
@@ -83,28 +83,28 @@ class _Candidate:
 def arrangement(
     thumbnails: Sequence[NDArray[np.float32]], views: tuple[int, int] | None, order: Order | None, what: str
 ) -> tuple[tuple[int, int], Order]:
-    """The arrangement, of (rows, columns) and an order, in which neighbouring views differ least.
+    """The arrangement, (rows, columns) and order, in which neighbouring views differ least.
 
     Args:
-        thumbnails: of all views, from `thumbnail`, as they are counted.
-        views: (rows, columns), if they are known.
-        order: likewise.
-        what: what has the views, for an error: "folder has 81 numbered pictures".
+        thumbnails: thumbnails of all views, from `thumbnail`, as counted.
+        views: (rows, columns), if known.
+        order: order, if known.
+        what: subject for an error message: "folder has 81 numbered pictures".
 
     Raises:
-        InputError: none is clearly better than the next.
+        InputError: no arrangement is clearly better than the next.
     """
     count = len(thumbnails)
     if views is not None and 1 in views:
         return views, order or "row-major"
     if len({small.shape for small in thumbnails}) > 1:
-        raise InputError(f"{what}, and they are not all of one size. Move away what is no view")
+        raise InputError(f"{what}, and they are not all of one size. Move away files that are not views")
     if count > _MOST:
         raise InputError(
             f"{what}, too many to be compared with one another: pass views=(rows, columns) and order="
         )
     differences = _differences(thumbnails)
-    # A square grid told as rows or as columns has the same neighbours: parallax decides later.
+    # A square grid has the same neighbours by rows and by columns: parallax decides later.
     orders: tuple[Order, ...] = (order,) if order else ("row-major", "serpentine", "chess")
     if views is None:
         shapes = [(n, count // n) for n in range(2, count // 2 + 1) if count % n == 0]
@@ -126,14 +126,12 @@ def arrangement(
             return (1, count), "row-major"
     if len(found) > 1 and not found[1].difference > _CLEARLY * found[0].difference:
         likely = " or ".join(f'views={c.views}, order="{c.order}"' for c in found[:2])
-        raise InputError(
-            f"{what}, and they do not tell how they are arranged. Pass {likely}, or whatever is right"
-        )
+        raise InputError(f"{what}, but their arrangement is not clear. Pass {likely}, or the correct arrangement")
     return found[0].views, found[0].order
 
 
 def thumbnail(picture: NDArray[Any]) -> NDArray[np.float32]:
-    """Block means of a picture's grey values.
+    """Block means of a picture's grey values, about 24 pixels across.
 
     Args:
         picture: shape (t, s) or (t, s, channel).
@@ -147,7 +145,7 @@ def thumbnail(picture: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _differences(thumbnails: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:
-    """Mean absolute difference of each two pictures."""
+    """Mean absolute difference of each pair of pictures."""
     count = len(thumbnails)
     small = np.stack(thumbnails).reshape(count, -1)
     differences = np.zeros((count, count))
@@ -157,6 +155,6 @@ def _differences(thumbnails: Sequence[NDArray[np.float32]]) -> NDArray[np.float6
 
 
 def _neighbours(differences: NDArray[np.float64], places: NDArray[np.intp]) -> Iterator[float]:
-    """The differences of all views next to each other."""
+    """Differences of all adjacent views."""
     yield from differences[places[:, :-1], places[:, 1:]].ravel()
     yield from differences[places[:-1], places[1:]].ravel()

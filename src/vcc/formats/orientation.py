@@ -1,4 +1,4 @@
-"""Putting the views of a light field in the order that its pictures ask for."""
+"""Correcting the order of views by parallax."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from vcc.formats.grid import Geometry
 OrientationChoice = Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"]
 
 VISIBLE_DISPARITY = 0.25
-"""Pixels per view: below this, "negative" may be noise."""
+"""Pixels per view; smaller negative disparities may be noise."""
 
-_GLANCE = 256  # pixels of nine views that are looked at first
-_NO_DOUBT = 0.9  # and the score at which nothing more is looked at
+_GLANCE = 256  # pixels of nine views for the first test
+_NO_DOUBT = 0.9  # score of the first test above which no further test is made
 
 
 def looked_at(count: int) -> set[int]:
-    """Which rows (or columns) of views, of ``count``, what is measured by parallax looks at."""
+    """The rows (or columns) of views, of ``count``, that parallax measurements use."""
     return {(count - 1) // 2, count // 2}
 
 
 @dataclass(frozen=True)
 class Moved:
-    """How the views were rearranged, and what to say of it."""
+    """Steps by which the views were rearranged, and a notice."""
 
     steps: tuple[str, ...] = ()
     notice: str = ""
@@ -52,18 +52,18 @@ def rearranged(
     truth: NDArray[Any] | None,
     seen: parallax.Orientation | None = None,
 ) -> tuple[NDArray[Any], Moved]:
-    """The views in the order that is asked for, or that parallax asks for.
+    """Rearrange the views as requested, or as parallax shows.
 
     Args:
         values: shape (v, u, t, s[, channel]).
-        choice: what is asked for.
-        stated: what the format states of the cameras.
-        frame: the full frame, where it states one: then nothing is rearranged unless asked for.
-        truth: true disparity of the middle view, where known.
-        seen: what `look` found of these values, if it was asked already.
+        choice: requested orientation.
+        stated: geometry stated by the format.
+        frame: the full frame if stated: then views are rearranged on request only.
+        truth: true disparity of the central view, if known.
+        seen: result of `look` for these values, if already available.
 
     Returns:
-        The values, rearranged in place where that can be, and what was done to them.
+        The values, rearranged in place if possible, and the steps.
     """
     if choice != "auto":
         for step in _FORCED[choice]:
@@ -98,10 +98,10 @@ def rearranged(
 
 
 def look(values: NDArray[Any]) -> parallax.Orientation:
-    """Whether the view axes are in order: a glance at the middle, which nearly always says yes, and else at more.
+    """Check the view axes by parallax: first in a small central part, then, if unclear, in more views and pixels.
 
     Args:
-        values: shape (v, u, t, s[, channel]). Only rows and columns of views that `looked_at` names need be there.
+        values: shape (v, u, t, s[, channel]). Only rows and columns of views given by `looked_at` are needed.
     """
     rows, columns, height, width = values.shape[:4]
     views = [slice(max((n - 1) // 2 - 1, 0), (n - 1) // 2 + 2) for n in (rows, columns)]
@@ -113,14 +113,14 @@ def look(values: NDArray[Any]) -> parallax.Orientation:
 
 
 def _frame_notice(frame: Affine, found: parallax.Orientation) -> str:
-    """A word where a frame that the format states and the parallax of the pictures contradict each other."""
+    """Notice if the stated frame and the parallax of the pictures contradict each other."""
     linear = frame.linear
     opposite = linear[0, 0] * linear[2, 2] * linear[1, 1] * linear[3, 3] < 0
     if found.verdict == "undetermined" or found.verdict == ("flipped" if opposite else "agrees"):
         return ""
     return (
-        f'parallax calls the view axes "{found.verdict}" (certainty {found.score:.0%}), which the frame that the '
-        'file states does not say. Nothing was changed: pass orientation="flip-rows", "flip-columns" or '
+        f'parallax calls the view axes "{found.verdict}" (certainty {found.score:.0%}), which contradicts the '
+        'frame that the file states. Nothing was changed: pass orientation="flip-rows", "flip-columns" or '
         '"transpose" to rearrange the views'
     )
 
@@ -132,7 +132,7 @@ def _flips_needed(
     directions: tuple[int, int] | None,
     truth: NDArray[Any] | None,
 ) -> tuple[list[str], str]:
-    """Which view axes to reverse, and why."""
+    """The view axes to reverse, and the reason."""
     if truth is not None:
         flips = [
             step
@@ -163,7 +163,7 @@ def _flips_needed(
 
 
 def _opposite(values: NDArray[Any], axis: parallax.Axis, truth: NDArray[Any]) -> bool:
-    """Whether the disparities along a view axis have the sign opposite to that of the true ones."""
+    """Whether the disparities along a view axis have the opposite sign of the true ones."""
     blocks = parallax.block_disparities(values, axis)
     trusted = blocks.confident
     rows, columns = (np.rint(places[trusted]).astype(int) for places in (blocks.rows, blocks.columns))
@@ -175,7 +175,7 @@ def _opposite(values: NDArray[Any], axis: parallax.Axis, truth: NDArray[Any]) ->
 
 
 def _flip_needed(values: NDArray[Any], directions: tuple[int, int] | None) -> tuple[str, str]:
-    """Which of two view axes of opposite parallax to reverse, and why."""
+    """Which of two view axes with opposite parallax to reverse, and the reason."""
     if directions in ((-1, 1), (1, -1)):
         axis = "rows" if directions == (-1, 1) else "columns"
         return f"flip-{axis}", f"the stated camera positions decrease along the {axis}"
@@ -191,9 +191,7 @@ def _flip_needed(values: NDArray[Any], directions: tuple[int, int] | None) -> tu
 
 
 def _moved(values: NDArray[Any], step: str) -> NDArray[Any]:
-    """The views rearranged in place where that can be: a light field may fill half of the
-    memory.
-    """
+    """Rearrange the views, in place if possible: a light field may fill half of the memory."""
     rows, columns = values.shape[:2]
     if step == "flip-rows":
         _reverse(values)
@@ -211,7 +209,7 @@ def _moved(values: NDArray[Any], step: str) -> NDArray[Any]:
 
 
 def _reverse(values: NDArray[Any]) -> None:
-    """Turn the order along the first axis round, in place."""
+    """Reverse the order along the first axis, in place."""
     last = len(values) - 1
     for place in range(len(values) // 2):
         first = values[place].copy()

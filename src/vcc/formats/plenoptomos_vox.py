@@ -1,13 +1,13 @@
-"""``.vox`` files of the plenoptomos toolbox: HDF5 with the samples and the plenoptic camera that recorded them.
+"""``.vox`` files of the plenoptomos toolbox: HDF5 with the samples and the parameters of the plenoptic camera.
 
-Facts of the format: https://cicwi.github.io/plenoptomos. Its (v, u) are places on the main lens, its (t, s)
-places in the plane of the microlenses, at a distance z₁ behind the main lens. A ray through the main lens
-(focal length f₁) at u that arrives at x there has the slope (x − u)/z₁ behind the lens and (x − u)/z₁ + u/f₁
-before it; and with the picture upright, x = −(k − k₀)·p::
+Description of the format: https://cicwi.github.io/plenoptomos. Its (v, u) are positions on the main lens, its
+(t, s) positions in the plane of the microlenses, at a distance z₁ behind the main lens. A ray through the main
+lens (focal length f₁) at u that reaches x there has slope (x − u)/z₁ behind the lens and (x − u)/z₁ + u/f₁ in
+front of it; for an upright picture, x = −(k − k₀)·p::
 
     s = (1/f₁ − 1/z₁)·u − (k − k₀)·p/z₁    (p: pitch of the microlenses; likewise t)
 
-which is a camera array in the plane of the main lens that converges where the lens focuses.
+This is a camera array in the plane of the main lens that converges where the lens focuses.
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ _CAMERA = "instrument/camera"
 _UNITS = {"m": 1.0, "mm": mm, "um": um, "µm": um}
 _DEFAULT_UNIT = "mm"
 _ORDER = "vutsc"
-_FOCUSED = 1e-2  # sensor out of the microlenses' focal plane by more than this share: plenoptomos calls it focused
+_FOCUSED = 1e-2  # relative defocus of the sensor above which plenoptomos calls the camera focused
 _EXACT_IN_FLOAT32 = 2**24
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is meant to be such a file, by its ending."""
+    """Whether the path is such a file, by its extension."""
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
 def read(path: Path) -> Decoded:
-    """The light field of a ``.vox`` file, with the frame that its camera makes.
+    """Read the light field of a ``.vox`` file, with the frame computed from its camera.
 
     Args:
         path: the file.
 
     Returns:
-        Linear samples: 8- and 16-bit counts as stored, others as floating-point numbers. The white and dark
-        pictures that the file may hold are not applied, and a remark says so.
+        Linear samples: 8- and 16-bit counts as stored, others as floating-point numbers. White and dark
+        pictures in the file are not applied, with a notice.
 
     Raises:
-        InputError: no h5py, a file that is truncated or no ``.vox``, one that holds a raw sensor picture, axes or
-            units that are not known, or negative samples.
+        InputError: no h5py, a file that is truncated or not a ``.vox``, a raw sensor picture, unknown axes or
+            units, or negative samples.
     """
     path = Path(path)
     with hdf5.opened(path) as file:
@@ -84,7 +84,7 @@ def read(path: Path) -> Decoded:
 
 
 def _samples(image: Any, path: Path) -> NDArray[Any]:
-    """The samples with axes (v, u, t, s[, channel])."""
+    """Read the samples with axes (v, u, t, s[, channel])."""
     mode, axes = (text(hdf5_reading.attribute(image, name, path)) for name in ("mode", "axes"))
     names = axes.split(":")
     if mode == "raw" or {"tau", "sigma"} & set(names):
@@ -108,7 +108,7 @@ def _samples(image: Any, path: Path) -> NDArray[Any]:
 
 
 class _Camera:
-    """The camera that a file describes: lengths in metres; None for what it does not state, or states as 0."""
+    """The camera described by a file: lengths in metres; None for values that are missing or 0."""
 
     def __init__(self, file: Any, path: Path) -> None:
         self._file, self._path = file, path
@@ -125,17 +125,17 @@ class _Camera:
         return found[0], found[1]
 
     def height(self, name: str) -> float | None:
-        """The distance of something behind the main lens; None if it is not stated."""
+        """The distance of a component behind the main lens; None if not stated."""
         found = self._stated(f"{name}/position", "x:y:z")
         return found[2] or None if found is not None else None
 
     def length(self, name: str) -> float | None:
-        """One length."""
+        """One length; None if not stated."""
         found = self._stated(name, "")
         return found[0] or None if found is not None else None
 
     def frame(self, shape: tuple[int, ...]) -> tuple[Affine | None, list[str]]:
-        """The frame of samples of this shape, None where the file states too little; and what to say."""
+        """The frame of samples of this shape, None if the camera is not fully described; and notices."""
         apart = self.lengths("main_lens/pixel_size", "v:u")
         pitch = self.lengths("micro_lens/physical_size", "t:s")
         focal_length, behind = self.length("main_lens/f1"), self.height("micro_lenses_array")
@@ -158,7 +158,7 @@ class _Camera:
         return Affine.from_parts(linear, linear @ middle), []
 
     def _stated(self, name: str, axes: str) -> tuple[float, ...] | None:
-        """Lengths in metres in the order of these axes, "" for a single one."""
+        """Lengths in metres in the order of these axes, "" for a single length."""
         where = f"{_CAMERA}/{name}"
         data = hdf5_reading.dataset(self._file, where, self._path)
         if data is None:

@@ -1,4 +1,4 @@
-"""Opening a light field, whichever format its folder or file follows."""
+"""Opening a light field from a folder or file of any supported format."""
 
 from __future__ import annotations
 
@@ -47,23 +47,23 @@ def read_geometry(
     files_outside: bool = False,
     **options: Any,
 ) -> FolderInfo:
-    """What a folder of views or a file holds: format, sizes and cameras.
+    """Return format, sizes and cameras of a folder of views or a file.
 
-    Reads one picture of a folder (all, where the arrangement of running numbers has to be found), and a file as a
-    whole. Quantities that the format does not state have these defaults and are listed in ``unknown``: a
-    spacing of 1 mm, a slope per pixel of 1/max(width, height) (a focal length as long as the
-    picture is wide), parallel views.
+    Reads one picture of a folder (all pictures if the arrangement of running numbers must be determined), or a
+    whole file. Quantities that the format does not state have these defaults and are listed in ``unknown``: a
+    spacing of 1 mm, a slope per pixel of 1/max(width, height) (a focal length equal to the width of the
+    picture), parallel views.
 
     Args:
         path: the folder or file.
         views: see `open_light_field`.
-        order: likewise.
-        sparse: list missing views in ``missing`` instead of refusing the folder.
+        order: see `open_light_field`.
+        sparse: list missing views in ``missing`` instead of raising.
         files_outside: see `open_light_field`.
-        options: likewise.
+        options: see `open_light_field`.
 
     Raises:
-        InputError: what `open_light_field` says of folders and files.
+        InputError: as in `open_light_field`, for folders and files.
     """
     path = expanded(path)
     with reading(path, "a light field"):
@@ -87,50 +87,49 @@ def open_light_field(
     progress: Progress | None = None,
     **options: Any,
 ) -> LightField:
-    """The light field in a file, or in a folder with a picture for each view.
+    """Open the light field in a file, or in a folder with a picture for each view.
 
-    Files are known by their ending and first bytes. Folders, in this order: a list ``views.csv`` (header
-    ``row,col,file``); the HCI 4D light-field benchmark (``input_CamNNN.png``, ``parameters.cfg``); names with
-    camera, focal length and sensor; names of the Stanford gantry (``out_RR_CC_V_U.png``); names that end in a row
-    and a column (``view_03_07.png``, counted from any number); running numbers (``frame_017.png``). A camera file,
-    ``parameters.cfg`` or ``param.txt``, is used with any of them.
+    Files are recognised by extension and first bytes. Folders are recognised in this order: a list
+    ``views.csv`` (header ``row,col,file``); the HCI 4D light field benchmark (``input_CamNNN.png``,
+    ``parameters.cfg``); names with camera, focal length and sensor; names of the Stanford gantry
+    (``out_RR_CC_V_U.png``); names that end in a row and a column (``view_03_07.png``, counted from any number);
+    running numbers (``frame_017.png``). A camera file, ``parameters.cfg`` or ``param.txt``, is used with any of
+    them.
 
     Args:
         path: the folder or file.
-        transfer: "srgb" takes stored samples as display-referred sRGB, as nearly all published
-            light fields are, and makes linear float32 of them; "linear" takes them as proportional
-            to light and keeps their type (an unsigned integer is a fraction of full scale).
-            Floating-point pictures are linear either way. "auto" takes what the pictures say of themselves (those
-            that were written here do; their exposure is undone, too), else what the format has: sRGB for pictures.
-            "as-is" keeps the stored numbers, whatever they stand for.
-        spacing: distance between neighbouring views, metres, one number or (dv, du); goes before
-            what the folder states, as do the next two.
+        transfer: transfer function of the stored samples. "srgb" decodes display-referred sRGB, the encoding of
+            nearly all published light fields, to linear float32; "linear" keeps samples and type (an unsigned
+            integer is a fraction of full scale). Floating-point pictures are always linear. "auto" uses the
+            pictures' metadata (written by this package; their exposure is undone too), else the default of the
+            format: sRGB for pictures. "as-is" keeps the stored numbers, whatever they mean.
+        spacing: distance between neighbouring views, metres, one number or (dv, du). This and the next two
+            arguments override the folder.
         slope_per_pixel: pixel pitch over focal length of the cameras, one number or (pt, ps).
-        focus_distance: where the views converge, metres; ``math.inf`` if they are parallel.
-        orientation: "auto" checks by parallax that the view axes fit the pictures and puts right
-            what does not, with a warning; "as-is" takes the files as they are; "flip-rows",
-            "flip-columns", "flip-both" and "transpose" rearrange the views without a check.
+        focus_distance: distance at which the views converge, metres; ``math.inf`` if they are parallel.
+        orientation: "auto" checks by parallax that the view axes fit the pictures, and corrects them with a
+            warning; "as-is" keeps the order of the files; "flip-rows", "flip-columns", "flip-both" and
+            "transpose" rearrange the views without a check.
         views: (rows, columns) of views, for running numbers, one picture of all views, and videos over a grid.
-        order: how views are counted: "row-major", "column-major", "serpentine" (every other row reversed),
-            "serpentine-columns" or "chess" (all fields of one colour first), drawn in docs/files.md. Running
-            numbers without it are arranged so that neighbours differ least.
-        files_outside: let a ``views.csv`` name files outside of its folder (``../a.png``, ``/data/a.png``). Only
-            for lists that you trust: one that came with a folder could name any picture of yours.
+        order: order in which views are counted: "row-major", "column-major", "serpentine" (every other row
+            reversed), "serpentine-columns" or "chess" (all fields of one colour first), illustrated in
+            docs/files.md. By default, running numbers are arranged so that neighbours differ least.
+        files_outside: allow a ``views.csv`` to name files outside its folder (``../a.png``, ``/data/a.png``).
+            Only for trusted lists: a list from elsewhere could name any of your pictures.
         progress: called as progress(done, total) after each picture.
-        options: what the reader of a file's format takes beside, see docs/files.md.
+        options: options of the file's format, see docs/files.md.
 
     Returns:
         Values of shape (v, u, t, s) or (v, u, t, s, channels).
 
     Warns:
-        ResultWarning: a quantity that nobody stated had to be assumed (see `read_geometry` for the
-            defaults), the views were rearranged, parallel views show negative disparities, some views are black or
-            nearly so (less than 2 % of the light of the brightest), or the format's reader has something to say.
+        ResultWarning: an unknown quantity had to be assumed (see `read_geometry` for the defaults), the views
+            were rearranged, parallel views show negative disparities, some views are nearly black (less than 2
+            % of the light of the brightest view), or a notice of the format's reader.
 
     Raises:
-        InputError: no such folder or file, nothing in it that looks like a light field, missing views or
-            two for one place, pictures that differ in size or type, a damaged picture or file, or an
-            impossible option.
+        InputError: no such folder or file, no light field in it, missing views or two for one place, pictures
+            that differ in size or type, a damaged picture or file, or an invalid option.
     """
     checks.one_of("transfer", transfer, get_args(Transfer))
     checks.one_of("orientation", orientation, get_args(OrientationChoice))
@@ -161,15 +160,15 @@ def open_sparse_views(
     files_outside: bool = False,
     progress: Progress | None = None,
 ) -> SparseViews:
-    """The views there are of a folder whose grid is not complete; for the arguments see `open_light_field`.
+    """Open the existing views of a folder with an incomplete grid; for the arguments see `open_light_field`.
 
-    The views are taken in the order that the files state: parallax is not looked at.
+    The views keep the order of the files: parallax is not checked.
 
     Warns:
-        ResultWarning: a quantity that nobody stated had to be assumed, or some views are black or nearly so.
+        ResultWarning: an unknown quantity had to be assumed, or some views are nearly black.
 
     Raises:
-        InputError: what `open_light_field` says, but for missing views; or a path that is a file.
+        InputError: as in `open_light_field`, except for missing views; or the path is a file.
     """
     checks.one_of("transfer", transfer, get_args(Transfer))
     path = expanded(path)
@@ -178,7 +177,7 @@ def open_sparse_views(
         grid = find_grid(path, views, order, sparse=True, files_outside=files_outside)
         info = info_of_grid(grid)
         cameras = cameras_for(info, grid.geometry, given, path)
-        assert cameras is not None  # no folder states a frame
+        assert cameras is not None  # folders never state a frame
         pictures = read_views(
             grid.present, info.picture_shape, _STORED[info.bits], **_how_stored(info, transfer), progress=progress
         )
@@ -193,12 +192,12 @@ def open_sparse_views(
 
 @dataclass
 class _Seen:
-    """What parallax says of views that were read, found while the others were still being read.
+    """Parallax of the views, measured while the remaining views were read.
 
     Args:
-        orientation: of the view axes, if it was looked at.
-        measured: whether the disparities were.
-        disparities: (lowest, highest), pixels per view; None where there is nothing to measure.
+        orientation: orientation of the view axes, if measured.
+        measured: whether the disparities were measured.
+        disparities: (lowest, highest), pixels per view; None if they cannot be measured.
     """
 
     orientation: parallax.Orientation | None = None
@@ -208,18 +207,18 @@ class _Seen:
 
 @dataclass(frozen=True, eq=False)
 class _Opened:
-    """What was read of a folder or file, its views in the order of the files.
+    """Content of a folder or file, with views in the order of the files.
 
     Args:
-        info: what it holds.
-        geometry: of the cameras, as the format states it.
-        cameras: these, and what the user says; None where a frame is stated.
+        info: format, sizes and cameras.
+        geometry: geometry of the cameras as stated by the format.
+        cameras: the same, with the arguments of the user; None if a frame is stated.
         values: linear, shape (v, u, t, s[, channel]).
-        counted: whether they were integers as stored: neither these nor light decoded from them are negative or
-            infinite, and there is no need to look through them all.
-        truth: true disparity of the middle view, where known.
-        seen: what parallax says.
-        notice: about the order of the files, or empty.
+        counted: whether the samples were stored as integers: neither these nor light decoded from them can be
+            negative or infinite, so they need no check.
+        truth: true disparity of the central view, if known.
+        seen: measured parallax.
+        notice: notice on the order of the files, or empty.
     """
 
     info: FolderInfo
@@ -233,7 +232,7 @@ class _Opened:
 
 
 def _with(options: dict[str, Any], files_outside: bool) -> dict[str, Any]:
-    """Options for the reader of a file, which refuses what means nothing to it."""
+    """Options for the reader of a file, which raises for options that it does not support."""
     return {**options, "files_outside": True} if files_outside else options
 
 
@@ -261,7 +260,7 @@ def _opened_file(decoded: Decoded, path: Path, given: Given, transfer: Transfer)
 
 
 def _middle(maps: NDArray[Any] | None) -> NDArray[Any] | None:
-    """The map of the middle view of those of all views, or the only one."""
+    """The map of the central view, from maps of all views or a single map."""
     if maps is None or maps.ndim == 2:
         return maps
     middle: NDArray[Any] = maps[(maps.shape[0] - 1) // 2, (maps.shape[1] - 1) // 2]
@@ -287,7 +286,7 @@ def _opened_folder(
         if orientation == "auto":
             seen.orientation = look(values)
         if parallel:
-            middle = [slice(max(n // 2 - 4, 0), n // 2 + 5) for n in (rows, columns)]  # as light fields measure it
+            middle = [slice(max(n // 2 - 4, 0), n // 2 + 5) for n in (rows, columns)]  # as in light fields
             seen.disparities, seen.measured = parallax.disparity_range(values[*middle]), True
 
     pictures = read_views(
@@ -304,10 +303,10 @@ def _opened_folder(
 
 
 def _how_stored(info: FolderInfo, transfer: Transfer) -> dict[str, Any]:
-    """How `read_views` is to take the numbers of a folder's pictures.
+    """The arguments of `read_views` on the transfer function of a folder's pictures.
 
     Raises:
-        InputError: the pictures say otherwise than told.
+        InputError: the pictures' metadata contradict ``transfer``.
     """
     if transfer == "as-is":
         return {"linear": True}
@@ -319,7 +318,7 @@ def _how_stored(info: FolderInfo, transfer: Transfer) -> dict[str, Any]:
 def _put_in_order(
     opened: _Opened, path: Path, orientation: OrientationChoice, given: Given
 ) -> tuple[LightField, tuple[str, ...]]:
-    """The light field with its views in the order that is asked for, and what to say of it."""
+    """The light field with its views in the requested order, and notices."""
     info, cameras, seen = opened.info, opened.cameras, opened.seen
     values, moved = rearranged(
         opened.values, orientation, opened.geometry, info.frame, opened.truth, seen.orientation
@@ -329,12 +328,12 @@ def _put_in_order(
     if moved.steps:
         seen = _Seen()
     shown = Disparities(measure=lambda: seen.disparities) if seen.measured else Disparities()
-    # Views that somebody rearranged by hand no longer show what the folder states.
+    # Views rearranged by the user no longer match the range that the folder states.
     disparity_range = info.disparity_range if orientation in ("auto", "as-is") else None
     if cameras is not None and "transpose" in moved.steps and given.spacing is None:
         cameras = cameras.turned()
     frame = info.frame if cameras is None else cameras.frame(values.shape)
-    assert frame is not None  # stated where there are no cameras
+    assert frame is not None  # a frame is stated if there are no cameras
     grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown)
     light_field = LightField.of(values, grid)
     views = {(row, column): values[row, column] for row, column in np.ndindex(values.shape[:2])}
@@ -348,9 +347,9 @@ def _put_in_order(
 
 
 def _shown(light_field: LightField, seen: _Seen) -> tuple[float, float] | None:
-    """The disparities that the pictures show, whatever is stated of them."""
+    """The measured disparities of the pictures, regardless of the stated ones."""
     if seen.measured:
         return seen.disparities
     if light_field.disparity_range is None:
-        return light_field.measured_disparity_range()  # kept: cameras ask for it again
+        return light_field.measured_disparity_range()  # cached: cameras use it again
     return parallax.disparity_range(light_field.values)

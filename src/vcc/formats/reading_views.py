@@ -34,23 +34,23 @@ def read_views(
     first: Collection[tuple[int, int]] = (),
     meanwhile: Callable[[NDArray[Any]], None] | None = None,
 ) -> NDArray[Any]:
-    """All pictures in one array, shape (n, t, s[, channel]), in the order of ``files``.
+    """Read all pictures into one array, shape (n, t, s[, channel]), in the order of ``files``.
 
     Args:
-        files: by (row, column).
-        picture: the shape that all pictures must have.
-        stored: the type that they must have.
-        linear: keep that type; else decode from sRGB to float32.
-        stated: what the pictures say of their numbers, where that makes a difference. Where they were exposed or
-            turned, all become float32.
+        files: files by (row, column).
+        picture: shape that all pictures must have.
+        stored: type that all pictures must have.
+        linear: keep the stored type; else decode from sRGB to float32.
+        stated: metadata of the pictures, if they differ from the default. If pictures were exposed or rotated,
+            the result is float32.
         progress: called as progress(done, total) after each picture.
-        first: places of the views to read before the others.
-        meanwhile: called with the array when these have been read, beside the reading of the others: what takes
-            some time and needs only them. Not called if one of them cannot be read.
+        first: places of the views to read first.
+        meanwhile: called with the array when these views have been read, in parallel with further reading; for
+            slow work that needs only these views. Not called if one of them cannot be read.
 
     Raises:
-        InputError: pictures that differ in size or type, a damaged picture, more samples than so few bytes may
-            hold, or more memory needed than there is.
+        InputError: pictures that differ in size or type, a damaged picture, a declared size too large for the
+            files, or not enough memory.
     """
     undone = stated is not None and not stated.is_neutral
     as_stored = linear and not undone
@@ -93,7 +93,7 @@ def read_views(
             decode(into, values[number])
 
     def when_read(awaited: list[Future[None]]) -> None:
-        wait(awaited)  # they were begun before this: it cannot wait for ever
+        wait(awaited)  # these tasks were submitted earlier, so this cannot deadlock
         if meanwhile is not None and all(not task.cancelled() and task.exception() is None for task in awaited):
             meanwhile(values)
 

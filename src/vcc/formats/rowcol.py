@@ -1,5 +1,5 @@
-"""Views whose names end in a row and a column: ``lf_1_1.png``, ``2067_01_09.png``,
-``view_r00_c02.jpg``; and those that count on besides, ``IMG_0001_017_02_04.png``.
+"""Views whose names end in row and column: ``lf_1_1.png``, ``2067_01_09.png``, ``view_r00_c02.jpg``; also with
+a running number, ``IMG_0001_017_02_04.png``.
 """
 
 from __future__ import annotations
@@ -17,15 +17,13 @@ _NUMBER = re.compile(r"\d+")
 
 
 def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
-    """The grid of the pictures whose names end in two numbers, row then column; None if there are
-    none.
+    """The grid of pictures whose names end in two numbers, row then column; None if there are none.
 
-    Counted from any number and in any even step. Pictures of other names are left alone. A third number that is
-    another one in each name, wherever it stands, counts the views and says nothing of their places.
+    Numbers may be counted from any start and in any constant step. Pictures with other names are ignored. A
+    third number that differs in every name is a running number and is ignored.
 
     Raises:
-        InputError: several such sets in the folder, or a grid that `vcc.formats.grid.arrange`
-            refuses.
+        InputError: several such sets in the folder, or as in `vcc.formats.grid.arrange`.
     """
     pictures = pictures_in(folder)
     sets: dict[str, list[Place]] = defaultdict(list)
@@ -52,8 +50,8 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
 
 
 def _beside_a_count(pictures: Sequence[Path]) -> list[Place]:
-    """The places of pictures whose names differ in three numbers, of which one is another in each; none if there
-    are none, or several sets of such names.
+    """The places of pictures whose names differ in three numbers, one of which is a running number; none if
+    there are no such names, or several sets of them.
     """
     sets: dict[str, list[Path]] = defaultdict(list)
     for file in pictures:
@@ -64,7 +62,7 @@ def _beside_a_count(pictures: Sequence[Path]) -> list[Place]:
 
 
 def _without_their_count(files: Sequence[Path]) -> list[Place]:
-    """Rows and columns in names of one form; none if these are not three numbers of which one only counts on."""
+    """Rows and columns in names of one form; none unless three numbers vary, one of which is a running number."""
     numbers = [[int(digits) for digits in _NUMBER.findall(file.stem)] for file in files]
     varying = [column for column in zip(*numbers, strict=True) if len(set(column)) > 1]
     places = [column for column in varying if len(set(column)) < len(files)]

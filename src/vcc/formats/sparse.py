@@ -1,4 +1,4 @@
-"""Views of a grid that is not complete: not a light field, and nothing is made up for what is missing."""
+"""Views of an incomplete grid: not a light field; missing views are not filled in."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from vcc.light_field import LightField
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SparseViews(Brief):
-    """Some of the views of a grid, each in its place.
+    """Some views of a grid, each at its place.
 
-    ``views[4, :]`` is the light field of a row that is complete, ``views[2:5, 3:6]`` that of a part; a part with
-    holes is refused, with what is missing.
+    ``views[4, :]`` is the light field of a complete row, ``views[2:5, 3:6]`` that of a part; a part with
+    missing views raises an error that lists them.
 
     Args:
-        pictures: samples of the views there are, shape (n, t, s) or (n, t, s, channels), as in a `vcc.LightField`.
+        pictures: samples of the existing views, shape (n, t, s) or (n, t, s, channels), as in a `vcc.LightField`.
         places: (row, column) of each, row 0 at the top, column 0 at the left.
         shape: (rows, columns) of the whole grid.
         frame: the 5×5 frame of the whole grid's light field.
-        disparity_range: (lowest, highest), pixels per view, where known.
+        disparity_range: (lowest, highest), pixels per view, if known.
         sample: see `vcc.LightField`.
 
     Raises:
-        InputError: places that do not fit the pictures or the grid.
+        InputError: places that do not match the pictures or the grid.
     """
 
     pictures: NDArray[Any]
@@ -56,7 +56,7 @@ class SparseViews(Brief):
 
     @property
     def present(self) -> NDArray[np.bool_]:
-        """Which views there are, shape (rows, columns)."""
+        """Which views exist, shape (rows, columns)."""
         there = np.zeros(self.shape, dtype=np.bool_)
         for place in self.places:
             there[place] = True
@@ -64,17 +64,17 @@ class SparseViews(Brief):
 
     @property
     def missing(self) -> tuple[tuple[int, int], ...]:
-        """(row, column) of the views that there are not."""
+        """(row, column) of the missing views."""
         return tuple((int(row), int(column)) for row, column in np.argwhere(~self.present))
 
     def __getitem__(self, part: tuple[int | slice, int | slice]) -> LightField:
-        """The light field of a complete part of the grid, in its place.
+        """The light field of a complete part of the grid, at its position.
 
         Args:
             part: (rows, columns), each a number or a slice.
 
         Raises:
-            InputError: a view of the part is missing, or there is none in it.
+            InputError: a view of the part is missing, or the part is empty.
         """
         rows, columns = (_places(wanted, size) for wanted, size in zip(part, self.shape, strict=True))
         number = {place: n for n, place in enumerate(self.places)}

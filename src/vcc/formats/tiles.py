@@ -1,7 +1,7 @@
-"""All views in one picture: two ways to lay them out, and which of them a picture shows.
+"""All views in one picture: two layouts, and their detection.
 
-A picture of R×C views of H×W pixels has R·H×C·W pixels. In an ESLF the pixels (l, k) of all views stand together,
-a block of R×C; in a mosaic the pixels of each view do, tiles of H×W.
+A picture of R×C views of H×W pixels has R·H×C·W pixels. In an ESLF, the pixels (l, k) of all views form a block
+of R×C; in a mosaic, the pixels of each view form a tile of H×W.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from numpy.typing import NDArray
 from vcc.base import checks
 
 Layout = Literal["eslf", "mosaic"]
-"""Blocks of one pixel of each view, as behind lenslets; or whole views side by side."""
+""""eslf": blocks of one pixel of each view, as behind lenslets; "mosaic": whole views side by side."""
 
-_LINES = 512  # of pixels that are looked at: differences of some thousand pixels are known to a few per cent
-_LAGS = 7  # at which pixels far apart are compared
+_LINES = 512  # of pixels that are sampled: gives mean differences to a few per cent
+_LAGS = 7  # number of distances at which far-apart pixels are compared
 
 
 def check(layout: object) -> None:
-    """Refuse what is neither None nor a layout.
+    """Raise unless the layout is None or valid.
 
     Raises:
-        InputError: that.
+        InputError: an invalid layout.
     """
     if layout is not None:
         checks.one_of("layout", layout, get_args(Layout))
 
 
 def taken_apart(picture: NDArray[Any], views: tuple[int, int], layout: Layout) -> NDArray[Any]:
-    """The views of a picture, shape (v, u, t, s[, channel]), not copied.
+    """The views of a picture as a NumPy view, shape (v, u, t, s[, channel]).
 
     Args:
         picture: shape (v·t, u·s[, channel]).
         views: (v, u).
-        layout: how they lie in it.
+        layout: layout of the views.
     """
     (rows, columns), (height, width) = views, (n // m for n, m in zip(picture.shape, views, strict=False))
     more = picture.shape[2:]
@@ -54,20 +54,20 @@ def put_together(views: NDArray[Any], layout: Layout) -> NDArray[Any]:
 
 
 def mosaic_evidence(picture: NDArray[Any], views: tuple[int, int]) -> float:
-    """How much more a picture looks like a mosaic than like an ESLF: a ratio, above 1 for a mosaic.
+    """Evidence for a mosaic against an ESLF: a ratio, above 1 for a mosaic.
 
-    Two things are asked of it, along rows and columns, and their answers multiplied. *Where are seams?* Where
-    tiles of a mosaic meet, the right edge of a view stands beside the left edge of the next; where blocks of an
-    ESLF do, the last view of a point beside the first view of the next point. *What is alike?* A tile apart stand
-    neighbouring views of the same pixel in a mosaic, and things far apart in an ESLF: is their difference nearer
-    to that of pixels a block apart, or to that of pixels far apart?
+    Two tests are made along rows and columns, and their results multiplied. *Seams:* at the border of two tiles
+    of a mosaic, the right edge of a view meets the left edge of the next; at the border of two blocks of an
+    ESLF, the last view of a point meets the first view of the next point. *Similarity:* pixels one tile apart
+    are the same pixel of neighbouring views in a mosaic, and distant scene points in an ESLF. The test is
+    whether their difference is closer to that of pixels one block apart, or to that of pixels far apart.
 
     Args:
         picture: shape (v·t, u·s[, channel]).
         views: (v, u).
 
     Returns:
-        1 where nothing tells, as of pictures without texture.
+        1 if there is no evidence, as for pictures without texture.
     """
     along = [(picture, views[1]), (picture.swapaxes(0, 1), views[0])]
     answers = [_along(_some(lines), count) for lines, count in along if count > 1]
@@ -79,19 +79,20 @@ def mosaic_evidence(picture: NDArray[Any], views: tuple[int, int]) -> float:
 
 
 def _some(lines: NDArray[Any]) -> NDArray[np.float32]:
-    """Grey values of some of the lines of a picture, in order in memory."""
+    """Grey values of a sample of the lines of a picture, contiguous in memory."""
     few = lines[:: max(1, len(lines) // _LINES)]
     grey = few.mean(axis=2, dtype=np.float32) if few.ndim == 3 else few.astype(np.float32)
     return np.ascontiguousarray(grey)
 
 
 def _along(lines: NDArray[np.float32], count: int) -> tuple[float, ...]:
-    """Mean differences along lines that ``count`` views share; see `mosaic_evidence`.
+    """Mean differences along lines shared by ``count`` views; see `mosaic_evidence`.
 
     Returns:
-        Of neighbouring pixels: across seams of tiles, elsewhere, across seams of blocks, within blocks; of pixels
-        a tile apart, a block apart, and far apart. Elsewhere is where blocks begin as they do at the seams of
-        tiles, and far apart is a tile less whole blocks, so that in an ESLF only the place in the scene differs.
+        For neighbouring pixels: across seams of tiles, elsewhere, across seams of blocks, within blocks; for
+        pixels one tile apart, one block apart, and far apart. "Elsewhere" has the same position in blocks as
+        the seams of tiles. "Far apart" is a tile minus whole blocks, so that in an ESLF only the scene point
+        differs.
     """
     size = lines.shape[1]
     tile = size // count
@@ -108,12 +109,12 @@ def _along(lines: NDArray[np.float32], count: int) -> tuple[float, ...]:
 
 
 def _apart(lines: NDArray[np.float32], lag: int) -> float:
-    """The mean difference of pixels so many places apart along lines; 0 where lines are shorter."""
+    """The mean difference of pixels ``lag`` apart along lines; 0 if the lines are shorter."""
     if lag >= lines.shape[1]:
         return 0.0
     return float(np.abs(lines[:, lag:] - lines[:, :-lag]).mean())
 
 
 def _ratio(one: float, other: float) -> float:
-    """One over the other; 1 where either is nothing, which tells nothing."""
+    """The ratio; 1 if either is zero (no evidence)."""
     return float(one / other) if one > 0 and other > 0 else 1.0

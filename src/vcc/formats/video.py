@@ -1,5 +1,5 @@
-"""Videos whose frames are views, of a camera that moves along a line or over a grid; and flights through a light
-field, as videos for people.
+"""Videos whose frames are views, of a camera moving along a line or over a grid; and flights through a light
+field as videos for people.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from vcc.formats.orders import Order, arrangement, check, running_numbers, thumb
 ENDINGS = (".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v")
 
 Movement = Literal["right", "left", "down", "up"]
-"""Where the camera of a video goes, as someone sees it who looks at the scene."""
+"""Direction in which the camera of a video moves, as seen by an observer who faces the scene."""
 Flight = Literal["serpentine", "circle", "row"]
-"""Ways through the views of a light field; see `save`."""
+"""Paths through the views of a light field; see `save`."""
 
 _BT709, _UNSPECIFIED, _SRGB_CURVE = 1, 2, 13  # ITU-T H.273
 _HIGH_DYNAMIC_RANGE = {16: "PQ", 18: "HLG"}
@@ -37,11 +37,11 @@ _THIS_FILE_ALONE = {
     "protocol_whitelist": "file",
     "format_whitelist": "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi",  # playlists would open other files
 }
-_HD = 720  # rows from which players take BT.709 where nothing is stated
+_HD = 720  # rows from which players assume BT.709 if nothing is stated
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is meant to be a video, by its ending."""
+    """Whether the path is a video, by its extension."""
     return path.suffix.lower() in ENDINGS and path.is_file()
 
 
@@ -56,26 +56,27 @@ def read(
     order: Order | None = None,
     progress: Progress | None = None,
 ) -> Decoded:
-    """The frames of a video as views from places in equal steps along a line, or over a grid.
+    """Read the frames of a video as views at equal steps along a line, or over a grid.
 
     Args:
         path: the video.
-        every: take every n-th frame.
-        first: the first frame to take, counted from 0.
-        last: the last that may be taken; the video's last if not given.
-        moves: where a camera on a line goes: "right" and "left" make one row of views, "down" and "up" one column.
-        views: (rows, columns) of a grid of views. Either this or the order makes a grid of the frames; the other
-            is then found from them: in the right arrangement neighbours differ least.
-        order: how the frames pass through a grid, see `vcc.formats.orders`.
-        progress: called as progress(done, total) after each frame; total is 0 where the video does not state it.
+        every: use every n-th frame.
+        first: first frame to use, counted from 0.
+        last: last frame that may be used; by default the last of the video.
+        moves: direction of a camera on a line: "right" and "left" make one row of views, "down" and "up" one
+            column.
+        views: (rows, columns) of a grid of views. If either this or the order is given, the frames form a grid
+            and the other is detected: in the right arrangement neighbours differ least.
+        order: order of the frames in a grid, see `vcc.formats.orders`.
+        progress: called as progress(done, total) after each frame; total is 0 if the video does not state it.
 
     Returns:
-        Samples of shape (1, views, t, s, 3) or (views, 1, t, s, 3), of a grid (rows, columns, t, s, 3): uint8, or
-        uint16 of videos of more than 8 bits, display-referred. Spacing and field of view are unknown.
+        Samples of shape (1, views, t, s, 3) or (views, 1, t, s, 3), for a grid (rows, columns, t, s, 3): uint8,
+        or uint16 for videos of more than 8 bits, display-referred. Spacing and field of view are unknown.
 
     Raises:
-        InputError: no PyAV, a damaged or truncated video, fewer than two frames to take or not as many as the grid
-            has views, an arrangement that the frames do not tell clearly, or the brightness curves of high dynamic
+        InputError: no PyAV, a damaged or truncated video, fewer than two frames or another number than the grid
+            needs, an arrangement that is not clear from the frames, or transfer functions of high dynamic
             range.
     """
     path = Path(path)
@@ -147,27 +148,27 @@ def save(
     quality: int = 18,
     lossless: bool = False,
 ) -> tuple[int, float, float]:
-    """Write a flight through the views as an MP4 (H.264, sRGB): each frame is a view, none is interpolated.
+    """Write a flight through the views as an MP4 (H.264, sRGB): each frame is a view, without interpolation.
 
     Args:
-        light_field: 1 or 3 channels.
-        path: where to; ends in ``.mp4``.
-        flight: "serpentine" passes all views, every other row backwards; "circle" the views nearest to the
-            largest ellipse, once round, so that it can be played over and over; "row" the middle row, left to
-            right (the column, if there is but one).
-        frames_per_second: how fast.
-        exposure: factor before the sRGB curve; "auto" takes 1 over the 99.5th percentile of
-            the brightest channels in the middle view.
+        light_field: a light field of 1 or 3 channels.
+        path: path to write to; ends in ``.mp4``.
+        flight: "serpentine" passes all views, every other row reversed; "circle" passes the views nearest to
+            the largest ellipse once, for looped playback; "row" passes the middle row, left to right (the
+            column, if there is only one).
+        frames_per_second: frame rate.
+        exposure: factor before the sRGB curve; "auto" uses 1 over the 99.5th percentile of the brightest
+            channels in the central view.
         quality: libx264's constant rate factor: 0 (best) to 51.
-        lossless: keep each 8-bit sample exactly (H.264 in RGB: large, and few players know it).
+        lossless: keep each 8-bit sample exactly (H.264 in RGB: large, and few players support it).
 
     Returns:
-        The number of frames, the exposure, and the share of the samples, 0 to 1, that it clipped. Without
-        ``lossless`` pictures of odd height or width have their last row or column doubled.
+        The number of frames, the exposure, and the fraction of the samples, 0 to 1, that were clipped. Without
+        ``lossless``, the last row or column of pictures with odd height or width is duplicated.
 
     Raises:
-        InputError: no PyAV, another ending or number of channels, an unknown flight, an impossible rate or
-            quality, or a place that cannot be written to.
+        InputError: no PyAV, another extension or number of channels, an unknown flight, an invalid rate or
+            quality, or a path that is not writable.
     """
     path = Path(path).expanduser()
     checks.ending("a flight", path, ".mp4")
@@ -195,10 +196,10 @@ def save(
 
 
 def library() -> Any:
-    """PyAV.
+    """Import PyAV.
 
     Raises:
-        InputError: it is not installed.
+        InputError: PyAV is not installed.
     """
     with checks.package("reading and writing videos", "av", "video"):
         import av
@@ -221,7 +222,7 @@ def _along_a_line(frames: list[NDArray[Any]], moves: Movement) -> NDArray[Any]:
 def _arranged(
     frames: list[NDArray[Any]], views: tuple[int, int] | None, order: Order | None, path: Path
 ) -> tuple[tuple[int, int], Order]:
-    """(rows, columns) and the order of frames over a grid; what is not told is found."""
+    """(rows, columns) and the order of frames over a grid; detected if not given."""
     if views is not None and views[0] * views[1] != len(frames):
         raise InputError(
             f"{path} gives {len(frames)} frames, and views={views} would be {views[0] * views[1]}. every=, first= "
@@ -233,7 +234,7 @@ def _arranged(
 
 
 def _check_claim(frame: Any, count: int, path: Path) -> None:
-    """Refuse so many frames of this size, if the file is too small for them: frames that repeat need no bytes."""
+    """Raise if the file is too small for this number of frames: repeated frames need no bytes."""
     width = 1 if _bits(frame) <= 8 else 2
     try:
         check_declared_size(
@@ -248,7 +249,7 @@ def _bits(frame: Any) -> int:
 
 
 def _picture(frame: Any, path: Path) -> NDArray[Any]:
-    """A frame as RGB, upright."""
+    """Convert a frame to upright RGB."""
     if frame.is_corrupt:
         raise InputError(f"{path}: the frame at {frame.time} s is damaged. Copy it again from where it came from")
     if frame.color_trc in _HIGH_DYNAMIC_RANGE:
@@ -277,9 +278,9 @@ def _notices(frame: Any, stream: Any) -> list[str]:
 
 
 def _check_complete(stream: Any, decoded: int, end: float, path: Path) -> None:
-    """Refuse a video whose frames end before it says that they do."""
+    """Raise if a video has fewer frames than it states."""
     stated = stream.frames
-    hours, _, rest = stream.metadata.get("DURATION", "").partition(":")  # Matroska counts no frames
+    hours, _, rest = stream.metadata.get("DURATION", "").partition(":")  # Matroska states no number of frames
     if not stated and rest and stream.average_rate:
         minutes, _, seconds = rest.partition(":")
         step = 1 / float(stream.average_rate)
@@ -293,7 +294,7 @@ def _check_complete(stream: Any, decoded: int, end: float, path: Path) -> None:
 
 
 def _way(rows: int, columns: int, flight: Flight) -> list[tuple[int, int]]:
-    """(row, column) of the views of a flight."""
+    """(row, column) of the views of a flight, in order."""
     checks.one_of("flight", flight, get_args(Flight))
     if flight == "serpentine":
         return [(r, c if r % 2 == 0 else columns - 1 - c) for r in range(rows) for c in range(columns)]
@@ -322,16 +323,16 @@ def encode(
     """Write sRGB pictures, all of one even size, as an H.264 film.
 
     Args:
-        path: where to.
-        pictures: (rows, columns, 3) each.
-        frames_per_second: how fast.
+        path: path to write to.
+        pictures: pictures of shape (rows, columns, 3).
+        frames_per_second: frame rate.
         quality: H.264's constant rate factor, 0 (best) to 51.
-        lossless: keep every bit, as RGB; few players show it.
-        words: what to call the file in an error.
+        lossless: keep samples exactly, as RGB; few players support it.
+        words: name of the file in an error.
 
     Raises:
-        InputError: no PyAV, or what it cannot write.
-        OSError: the disk refuses.
+        InputError: no PyAV, or pictures that it cannot write.
+        OSError: the write fails.
     """
     av = library()
     try:

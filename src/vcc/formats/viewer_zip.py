@@ -1,4 +1,4 @@
-"""Light fields of the Stanford archive's viewer: a ``.zip`` of pictures and an XML list of where each was taken.
+"""Light fields for the Stanford archive's viewer: a ``.zip`` of pictures and an XML list of their positions.
 
 ::
 
@@ -7,9 +7,9 @@
       …
     </lightfield>
 
-Facts: http://lightfield.stanford.edu/aperture.html. A folder with such a list beside its pictures, and the
-list itself, are read too. The positions have no unit, and may jitter: views go to the nearest place of a
-regular grid.
+Source: http://lightfield.stanford.edu/aperture.html. A folder with such a list next to its pictures, and the
+    list itself, are supported too. The positions have no unit and may jitter: each view is assigned to the
+    nearest place of a regular grid.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ from vcc.formats.grid import Decoded, Geometry, Place, arrange
 
 ENDINGS = (".zip", ".xml")
 
-_LARGEST_JITTER = 0.25  # of a step of the grid: beyond this a view has no place
-_SAME_STEP = 0.3  # of the largest gap: what is closer belongs to one row
+_LARGEST_JITTER = 0.25  # of a step of the grid: with more jitter, a view has no place
+_SAME_STEP = 0.3  # of the largest gap: views closer than this belong to one row
 _DEPTH = "depth.png"
 
 
 def recognised(path: Path) -> bool:
-    """Whether this is a ``.zip``, or a list of views or a folder with one, by its root element."""
+    """Whether the path is a ``.zip``, or a list of views or a folder with one, by its root element."""
     if path.is_dir():
         return bool(_lists_in(path))
     if not path.is_file():
@@ -52,19 +52,18 @@ def recognised(path: Path) -> bool:
 
 
 def read(path: Path, *, progress: Progress | None = None) -> Decoded:
-    """The light field that a viewer's list describes.
+    """Read the light field described by a viewer's list.
 
     Args:
         path: the ``.zip``, the ``.xml`` or the folder.
         progress: called as progress(done, total) after each picture.
 
     Returns:
-        Samples as stored; rows and columns of views in the order of growing v and u.
+        Samples as stored; rows and columns of views in ascending order of v and u.
 
     Raises:
-        InputError: a damaged zip, no list or several, XML that cannot be understood, a picture that is not
-            there or is damaged, pictures that differ, positions that lie on no regular grid, missing views or
-            two for a place.
+        InputError: a damaged zip, no list or several, invalid XML, a picture that is missing or damaged,
+            pictures that differ, positions that are not on a regular grid, missing views or two for one place.
     """
     path = Path(path)
     with _opened(path) as store:
@@ -91,7 +90,7 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
 
 
 class _Store(Protocol):
-    """Where list and pictures are."""
+    """Access to list and pictures."""
 
     path: Path
 
@@ -184,7 +183,7 @@ def _opened(path: Path) -> Iterator[_Store]:
 
 
 def _is_hidden(name: str) -> bool:
-    """Whether this is what file managers add (__MACOSX/…, .name)."""
+    """Whether this is a file that file managers add (__MACOSX/…, .name)."""
     return any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(name).parts)
 
 
@@ -215,7 +214,7 @@ def _check_one(lists: list[str], path: Path) -> None:
 
 
 def _inside(name: str, path: Path) -> PurePosixPath:
-    """The name of a picture, which is beside the list or below it."""
+    """Check that the path of a picture is next to the list or below it."""
     place = PurePosixPath(name.replace("\\", "/"))
     if "://" in name or place.is_absolute() or ".." in place.parts:
         raise InputError(f'{path} lists "{name}", which is not beside the list. Put it there and correct the list')
@@ -249,7 +248,7 @@ def _listed(store: _Store) -> list[tuple[str, float, float]]:
 
 
 def _grid(positions: list[float], axis: str, path: Path) -> tuple[list[int], float]:
-    """The row (or column) of each position on a regular grid, and the grid's step (0 for a single row)."""
+    """The row (or column) of each position on a regular grid, and the step of the grid (0 for a single row)."""
     at = np.array(positions)
     sorted_ = np.sort(at)
     with np.errstate(over="ignore"):
@@ -262,7 +261,7 @@ def _grid(positions: list[float], axis: str, path: Path) -> tuple[list[int], flo
     means = np.array([part.mean() for part in np.split(sorted_, breaks + 1)])
     step = float(np.diff(means).min())
     numbers = np.rint((at - means[0]) / step)
-    # A better step from all views, then: does each of them lie where the grid says?
+    # Refine the step with all views, then check the position of each view.
     step, first = (float(n) for n in np.polyfit(numbers, at, 1))
     off = np.abs(at - first - step * numbers).max()
     if off > _LARGEST_JITTER * step:
@@ -276,7 +275,7 @@ def _grid(positions: list[float], axis: str, path: Path) -> tuple[list[int], flo
 def _pictures(
     store: _Store, files: tuple[tuple[Path | None, ...], ...], progress: Progress | None
 ) -> NDArray[Any]:
-    """All views in one array, shape (v, u, t, s[, channel])."""
+    """Read all views into one array, shape (v, u, t, s[, channel])."""
     names = [file.as_posix() for row in files for file in row if file is not None]
     values: NDArray[Any] | None = None
     for number, name in enumerate(names):

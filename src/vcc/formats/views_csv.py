@@ -1,6 +1,4 @@
-"""A list of views, ``views.csv``: header ``row,col,file`` (or ``row,column,file``), a line for
-each view.
-"""
+"""A list of views, ``views.csv``: header ``row,col,file`` (or ``row,column,file``), then one line per view."""
 
 from __future__ import annotations
 
@@ -17,19 +15,19 @@ NAME = "views.csv"
 
 
 def find(folder: Path, *, sparse: bool = False, anywhere: bool = False) -> ViewGrid | None:
-    """The grid that the folder's ``views.csv`` lists; None if there is no such file.
+    """The grid listed in the folder's ``views.csv``; None if there is no such file.
 
     Row 0 is at the top, column 0 at the left; files are named relative to the folder.
 
     Args:
-        folder: where the list is.
-        sparse: leave None where a view is missing, instead of refusing the grid.
-        anywhere: allow files outside of the folder. A list that came with a folder could else name any picture of
-            whoever opens it.
+        folder: folder of the list.
+        sparse: use None for missing views instead of raising.
+        anywhere: allow files outside the folder. A list from elsewhere could otherwise name any picture of the
+            user.
 
     Raises:
-        InputError: another header, a number that is not whole, a file that is not there or not in the folder, or a
-            grid that `vcc.formats.grid.arrange` refuses.
+        InputError: another header, a number that is not whole, a file that is missing or outside the folder, or
+            as in `vcc.formats.grid.arrange`.
     """
     table = folder / NAME
     if not os.path.lexists(table):

@@ -1,4 +1,4 @@
-"""What the pictures of a folder of views say of their numbers, and light made of these."""
+"""Metadata of the pictures of a folder of views, and conversion to linear light."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from vcc.files.images_with_metadata import ImageWithMetadata, check_agrees, ligh
 
 @dataclass(frozen=True)
 class ViewsWithMetadata:
-    """What pictures say of their numbers, all of them alike.
+    """The metadata of pictures, checked to be consistent.
 
     Args:
-        said: by file; empty where no picture says anything.
-        transfer: how their numbers stand for light; None where nothing is said.
+        said: metadata by file; empty if no picture has any.
+        transfer: transfer function of the pictures; None if they have no metadata.
     """
 
     said: dict[Path, ImageMetadata]
@@ -29,11 +29,10 @@ class ViewsWithMetadata:
 
     @classmethod
     def of(cls, files: Iterable[Path]) -> ViewsWithMetadata:
-        """What these pictures say; their numbers are not read.
+        """Read the metadata of these pictures, without their samples.
 
         Raises:
-            InputError: some say otherwise than others, where that makes a difference; raw numbers of a sensor; or
-                a damaged statement.
+            InputError: relevant metadata differ between pictures; raw numbers of a sensor; or damaged metadata.
         """
         every = {file: metadata_of(file) for file in files}
         said = {file: each for file, each in every.items() if each is not None}
@@ -41,7 +40,7 @@ class ViewsWithMetadata:
         for file, each in said.items():
             if each.recording is not None:
                 raise InputError(
-                    f"{file} says that it holds {each.in_words}: a raw recording is no view, decode it"
+                    f"{file} states that it holds {each.in_words}: a raw recording is not a view, decode it"
                 )
         first = next(iter(said), None)
         if first is None:
@@ -54,50 +53,50 @@ class ViewsWithMetadata:
                 )
             if silent and (each.transfer != "srgb" or not each.is_neutral):
                 raise InputError(
-                    f"{file.name} says that its numbers are {each.in_words}, and {silent[0].name} does not say "
-                    "what its are: it is not of the same make. Write all views anew"
+                    f"{file.name} says that its numbers are {each.in_words}, and {silent[0].name} has no "
+                    "metadata. Write all views again in the same way"
                 )
         return cls(said, said[first].transfer)
 
     @property
     def is_neutral(self) -> bool:
-        """Whether the numbers are upright and not exposed, so that they can be kept as they are."""
+        """Whether the numbers are upright and not exposed, so that they can be used unchanged."""
         return all(each.is_neutral for each in self.said.values())
 
     @property
     def is_usual(self) -> bool:
-        """Whether nothing is said that would not be assumed of pictures that say nothing."""
+        """Whether the metadata equal the assumptions for pictures without metadata."""
         return self.transfer in (None, "srgb") and self.is_neutral
 
     @property
     def in_words(self) -> str:
-        """For people, in a few words; empty where nothing is said."""
+        """Short text for people; empty if there are no metadata."""
         differ = len({each.exposure for each in self.said.values()}) > 1
         first = next(iter(self.said.values()), None)
         return "" if first is None else first.in_words + (" and others" if differ else "")
 
     def check(self, told: str) -> None:
-        """Refuse a transfer function that the files contradict.
+        """Raise if the files contradict a transfer function.
 
         Raises:
-            InputError: it is "srgb" or "linear", and the files say the other.
+            InputError: it is "srgb" or "linear", and the files state the other.
         """
         for file, each in self.said.items():
             check_agrees(file, each, told)
             return
 
     def picture(self, file: Path, samples: NDArray[Any]) -> ImageWithMetadata:
-        """A picture's numbers with what it says of them.
+        """A picture's samples with its metadata.
 
         Raises:
-            InputError: another program has changed them since they were written.
+            InputError: another program has changed the samples since they were written.
         """
         picture = ImageWithMetadata(file, samples, self.said[file], changed=not self.said[file].fits(samples))
         if picture.changed:
-            raise InputError(f"{unknown(picture)}: write all views anew, without descriptions")
+            raise InputError(f"{unknown(picture)}: write all views again, without descriptions")
         return picture
 
     def light(self, file: Path, samples: NDArray[Any]) -> NDArray[np.float32]:
-        """Light, linear and upright, of a picture's numbers; errors as in `picture`."""
+        """Linear, upright light of a picture's samples; errors as in `picture`."""
         light = light_of(self.picture(file, samples))
         return light if self.said[file].upright else light[::-1, ::-1]

@@ -1,4 +1,4 @@
-"""Writing light fields: one function for all formats, and the folders with a picture for each view."""
+"""Writing light fields: one function for all formats, and folders with a picture for each view."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from vcc.formats.hci import PARAMETERS, parameters_text
 from vcc.store import save_store
 
 Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mosaic", "mp4", "npz"]
-"""What a light field may be written as; see `save_light_field`."""
+"""Formats in which a light field can be written; see `save_light_field`."""
 _ENDINGS: dict[Kind, str] = {
     "zarr": ".zarr",
     "mat": ".mat",
@@ -42,7 +42,7 @@ _ENDINGS: dict[Kind, str] = {
     "hci": "",
     "views": "",
 }
-"""Of each kind; an ending alone asks for the first kind that has it."""
+"""Extension of each kind; an extension without a kind selects the first kind that has it."""
 _FOLDERS = ("hci", "views", "zarr")
 _HOW: dict[Kind, str] = {
     "zarr": "Zarr store",
@@ -51,24 +51,24 @@ _HOW: dict[Kind, str] = {
     "eslf": "one picture of tiled blocks of views (ESLF), sRGB; it holds no geometry",
     "mosaic": "one picture of all views side by side, sRGB; it holds no geometry",
 }
-_PNG_LEVEL = 4  # a third of the usual level's time, for 5 % more bytes
+_PNG_LEVEL = 4  # a third of the default level's time, for 5 % more bytes
 DARK = 0.05
-"""Of white: views whose brightest parts are darker hold little of it in 8 bits, and look black."""
+"""Fraction of white: views with darker maxima lose detail in 8 bits and look black."""
 _POINTS_UNSAID = (
-    "nothing here says that its samples are values at points, and they are read back as means over pixels: "
-    'dataclasses.replace(light_field, sample="point") says it again'
+    "this format cannot state that samples are values at points, so they are read as means over pixels: restore "
+    'the setting with dataclasses.replace(light_field, sample="point")'
 )
 
 
 @dataclass(frozen=True)
 class SavedLightField:
-    """What was written: where, as what, and a line that says so to a person.
+    """A report on a written light field: path, format, exposure, clipping and a line for people.
 
     Args:
         path: the file or folder.
         kind: see `save_light_field`.
-        exposure: the factor between radiance and what was stored (before the sRGB curve).
-        clipped: the share of the samples, 0 to 1, that were too bright for that.
+        exposure: the factor between radiance and stored values (before the sRGB curve).
+        clipped: fraction of the samples, 0 to 1, that were clipped.
         description: one line for people.
     """
 
@@ -87,7 +87,7 @@ def save_light_field(
     progress: Progress | None = None,
     **options: Any,
 ) -> SavedLightField:
-    """Write a light field; the ending of the name, or ``kind``, chooses the format.
+    """Write a light field; the extension of the name, or ``kind``, selects the format.
 
     | name                 | kind     | what                                                               |
     |----------------------|----------|--------------------------------------------------------------------|
@@ -101,25 +101,25 @@ def save_light_field(
     | ``….mp4``            | "mp4"    | a flight through the views, for people; no geometry                |
 
     Args:
-        light_field: in memory or in a store. For stores, folders and flights one view of a
-            store is read at a time.
-        path: where to. A folder must not exist yet, or be empty.
+        light_field: a light field in memory or in a store. Stores, folders and flights are written by reading
+            one view of a store at a time.
+        path: path to write to. A folder must be empty or not exist yet.
         kind: see above; needed for "views" and "mosaic".
         progress: called as progress(done, total) after each view of a folder.
-        options: what the format takes: for "hci" and "views" see `save_folder`, for the others
+        options: options of the format: for "hci" and "views" see `save_folder`, for the others
             `vcc.store.save_store`, `vcc.formats.arrays.save`, `vcc.formats.lftoolbox.save`,
             `vcc.formats.eslf.save`, `vcc.formats.video.save`.
 
     Returns:
-        Where it was written and what had to be done for it.
+        A report with path, format, exposure and clipping.
 
     Warns:
-        ResultWarning: samples too bright for a file were clipped, or all are dark; or a format has no room to say
+        ResultWarning: samples too bright for a file were clipped, or all are dark; or a format cannot state
             that samples are values at points.
 
     Raises:
-        InputError: an ending that is not known or is not that of the kind, an option that the format does not
-            take, or what the format's writer refuses.
+        InputError: an unknown extension or one that does not match the kind, an option that the format does not
+            support, or as raised by the format's writer.
     """
     check_is_light_field(light_field)
     path = Path(path).expanduser()
@@ -129,7 +129,7 @@ def save_light_field(
     for option in options:
         if option not in taken:
             takes = f"takes {', '.join(sorted(taken))}" if taken else "takes no options"
-            raise InputError(f'{path}: {option}= means nothing to the format "{chosen}", which {takes}')
+            raise InputError(f'{path}: {option}= is not supported by the format "{chosen}", which {takes}')
     if chosen in ("hci", "views"):
         saved: SavedLightField = writer(light_field, path, kind=chosen, progress=progress, **options)
         return saved
@@ -163,29 +163,31 @@ def save_folder(
 ) -> SavedLightField:
     """Write a folder with a picture for each view, and its cameras in a ``parameters.cfg``.
 
-    Read back, linear samples differ by half a step of the stored numbers at most: of sRGB with 8 bits 0.0045 of
-    full scale (the curve's steepest half code), with 16 bits 1.8e-5; of linear numbers 0.002 and 7.7e-6. OpenEXR
-    keeps float32 samples as they are, and linear integers come back as they were if ``bits`` is theirs.
+    After reading, linear samples differ by at most half a step of the stored numbers: for sRGB with 8 bits
+    0.0045 of full scale (half a code where the curve is steepest), with 16 bits 1.8e-5; for linear numbers
+    0.002 and 7.7e-6. OpenEXR keeps float32 samples unchanged, and linear integers are unchanged if ``bits``
+    matches their type.
 
     Args:
-        light_field: 1 or 3 channels.
-        path: the folder, not there yet or empty. It appears whole or not at all.
+        light_field: a light field of 1 or 3 channels.
+        path: the folder, empty or new. It appears complete or not at all.
         kind: "hci" for the names of the HCI benchmark, "views" for ``view_RR_CC``, counted from 00.
         bits: 8 or 16.
-        transfer: "linear" stores numbers proportional to light; the pictures say so.
-        ending: of the pictures: ``.png``; with "views" also ``.tif`` and ``.exr`` (linear float32, no exposure).
-        exposure: factor from radiance to full scale; "auto" takes 1 over the 99.5th percentile of the
-            brightest channels in the middle view.
+        transfer: "linear" stores linear numbers; the pictures' metadata state this.
+        ending: extension of the pictures: ``.png``; with "views" also ``.tif`` and ``.exr`` (linear float32, no
+            exposure).
+        exposure: factor from radiance to full scale; "auto" uses 1 over the 99.5th percentile of the brightest
+            channels in the central view.
         progress: called as progress(done, total) after each view.
 
     Warns:
-        ResultWarning: samples too bright were clipped, or all are dark; or ``parameters.cfg`` cannot hold the
-            cameras ("views" only), with what to pass when the folder is opened.
+        ResultWarning: bright samples were clipped, or all samples are dark; or ``parameters.cfg`` cannot
+            represent the cameras ("views" only), with the arguments to pass when opening the folder.
 
     Raises:
-        InputError: another number of channels, impossible options, a folder with something in it or that cannot
-            be written to, cameras that ``parameters.cfg`` cannot hold ("hci"), or a frame that is not that of a
-            camera array.
+        InputError: another number of channels, invalid options, a folder that is not empty or not writable,
+            cameras that ``parameters.cfg`` cannot represent ("hci"), or a frame that is not that of a camera
+            array.
     """
     path, grid = Path(path).expanduser(), light_field.grid
     _check_folder_options(grid, kind, ending, exposure)
@@ -221,10 +223,10 @@ def save_folder(
 
 
 def kind_of(path: Path, kind: Kind | None) -> Kind:
-    """The format that a name and a kind ask for; see `save_light_field`.
+    """The format selected by a name and a kind; see `save_light_field`.
 
     Raises:
-        InputError: an ending that is not known, or that is not that of the kind.
+        InputError: an unknown extension, or one that does not match the kind.
     """
     ending = path.suffix.lower()
     if kind is None:
@@ -238,7 +240,7 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
         return chosen
     checks.one_of("kind", kind, get_args(Kind))
     if kind not in _FOLDERS and ending != _ENDINGS[kind]:
-        raise InputError(f'"{path.name}" is to be of the kind "{kind}": end its name in {_ENDINGS[kind]}')
+        raise InputError(f'kind="{kind}" does not match the name "{path.name}": end it in {_ENDINGS[kind]}')
     return kind
 
 
@@ -270,7 +272,7 @@ def _warn_of_clipping(path: Path, clipped: float, exposure: Exposure) -> None:
 
 
 def _warn_of_darkness(light_field: Samples, path: Path, exposure: Exposure) -> None:
-    if exposure == "auto" or light_field.grid.kind.kind == "u":  # integers are what somebody else counted
+    if exposure == "auto" or light_field.grid.kind.kind == "u":  # integers have a fixed exposure
         return
     brightest = exposure / Codes(light_field, 8, "srgb", "auto").exposure
     if brightest < DARK:
@@ -294,7 +296,7 @@ def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure
             f'the pictures of a folder of the kind "{kind}" end in {" or ".join(endings)}, not "{ending}"'
         )
     if ending == ".exr" and exposure != 1:
-        raise InputError(f"exposure={exposure} has no place in .exr files, which hold the samples untouched")
+        raise InputError(f"exposure={exposure} is not supported for .exr files, which hold the samples unchanged")
     if grid.channels not in (None, 1, 3):
         raise InputError(
             f"pictures have 1 or 3 channels, and this light field has {grid.channels}: choose channels, "
@@ -304,7 +306,7 @@ def _check_folder_options(grid: Grid, kind: str, ending: str, exposure: Exposure
 
 @contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder beside ``path``; it becomes ``path`` if all goes well, and else nothing is left of it."""
+    """Yield a temporary folder; rename it to ``path`` if the block succeeds, else remove it."""
     check_name(path)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         what = "holds files already" if path.is_dir() else "is a file"
@@ -331,7 +333,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
 
 
 def _parameters(grid: Grid, cameras: Cameras, path: Path, kind: str) -> tuple[str, str]:
-    """The text of parameters.cfg, empty where it cannot hold the cameras; and then what to tell."""
+    """The text of parameters.cfg, empty if it cannot represent the cameras; and then a notice."""
     if not cameras.are_square:
         dv, du = cameras.spacing
         pt, ps = cameras.slope_per_pixel
@@ -346,7 +348,7 @@ def _parameters(grid: Grid, cameras: Cameras, path: Path, kind: str) -> tuple[st
             f"{PARAMETERS} cannot hold its cameras, and there is none. Open it with spacing=({dv!r}, {du!r}), "
             f"slope_per_pixel=({pt!r}, {ps!r}), focus_distance={cameras.focus_distance!r}{more}"
         )
-    # Square cameras may differ by rounding, of which the file is to say nothing.
+    # Square cameras may differ by rounding, which the file should not state.
     alike = replace(cameras, spacing=(cameras.spacing[1], cameras.spacing[1]))
     views, picture = grid.shape[:2], grid.shape[2:4]
     text = parameters_text(

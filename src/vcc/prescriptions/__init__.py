@@ -1,6 +1,6 @@
-"""Real lenses from prescriptions: the files that list a lens's surfaces, reduced to first order.
+"""Real lenses from prescriptions: files that list a lens's surfaces, reduced to first order.
 
-`load_lens` reads a file into an element for a camera; `read_prescription` gives the surfaces themselves.
+`load_lens` reads a file into an element for a camera; `read_prescription` returns the surfaces.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ _READERS = {".dat": pbrt.read, ".zmx": zemax.read}
 def read_prescription(
     path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float] | None = None
 ) -> Prescription:
-    """The surfaces of a lens as a file lists them, light travelling from the first to the last.
+    """Read the surfaces of a lens from a file, in the order in which light passes them.
 
     Args:
         path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
-        wavelength: metres, at which catalogue glasses are taken; a ``.dat`` gives indices at one only.
-        glasses: refractive indices by name, taken before any catalogue: ``{"N-BK7": 1.5168}``.
+        wavelength: wavelength for catalogue glasses, metres; a ``.dat`` states indices at one wavelength only.
+        glasses: refractive indices by name, which override catalogues: ``{"N-BK7": 1.5168}``.
 
     Raises:
-        InputError: no such file, another kind of file, a line that cannot be read, a surface that has no
-            paraxial reduction here (asphere, mirror, coordinate break …) or whose glass is not known. The
-            message names the file and the surface or line.
+        InputError: no such file, another file format, an invalid line, a surface without a paraxial reduction
+            here (asphere, mirror, coordinate break …), or an unknown glass. The message names the file and the
+            surface or line.
     """
     file = expanded(path)
     reader = _READERS.get(file.suffix.lower())
@@ -60,30 +60,31 @@ def load_lens(
     decentre: tuple[float, float] = (0.0, 0.0),
     name: str = "",
 ) -> FirstOrder:
-    """A real lens, reduced to first order: light travels through its surfaces as the file lists them.
+    """Read a real lens, reduced to first order; light passes its surfaces in the order of the file.
 
-    Paraxial: principal planes, focal length, stop and pupils are the lens's own, aberrations are not, and of
-    the rims only the stop (and with ``rims`` the first and the last surface) cuts light off.
-    To focus: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
+    Paraxial: principal planes, focal length, stop and pupils are those of the lens; aberrations are not
+        modelled. Of the rims, only the stop (and with ``rims`` the first and the last surface) limits the
+        light. To focus: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
 
     Args:
         path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
-        z: place of the first surface, or of what ``z_of`` says, metres.
-        z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0 the lens then looks from where the views of
-            the light field stand, its glass before them; see `vcc.FirstOrder.from_entrance_pupil`.
-        stop_diameter: metres; None for the file's own stop.
-        f_number: focal length / entrance pupil, for a distant scene, by which to open the stop instead.
-        wavelength: metres, at which catalogue glasses are taken.
-        glasses: refractive indices by name, taken before any catalogue: ``{"N-BK7": 1.5168}``.
-        rims: whether the rims of the first and the last surface cut light off too.
-        decentre: place (x, y) of the lens's axis, metres.
-        name: how to call it in messages and plots.
+        z: position of the first surface, or of the reference ``z_of``, metres.
+        z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0, the entrance pupil is in the plane of
+            the light field's views, with the lens's glass in front of it; see
+            `vcc.FirstOrder.from_entrance_pupil`.
+        stop_diameter: diameter of the stop, metres; None for the stop of the file.
+        f_number: focal length / entrance pupil for a distant scene, as an alternative to ``stop_diameter``.
+        wavelength: wavelength for catalogue glasses, metres.
+        glasses: refractive indices by name, which override catalogues: ``{"N-BK7": 1.5168}``.
+        rims: whether the rims of the first and the last surface limit the light too.
+        decentre: position (x, y) of the lens's axis, metres.
+        name: name in messages and plots.
 
     Warns:
         ResultWarning: the stop is opened wider than in the file.
 
     Raises:
-        InputError: see `read_prescription` and `Prescription.first_order`.
+        InputError: as in `read_prescription` and `Prescription.first_order`.
     """
     prescription = read_prescription(path, wavelength=wavelength, glasses=glasses)
     with reading(path, "a lens"):

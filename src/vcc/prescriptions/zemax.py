@@ -1,10 +1,9 @@
 """Sequential lenses from Zemax OpticStudio's text files (.zmx): spheres and planes in glass and air.
 
-Each line is a keyword and values; ``SURF n`` starts a surface, on which CURV is the curvature, DISZ the distance
-to the next surface, GLAS the medium behind, DIAM the semi-diameter, STOP the mark of the aperture stop.
-The first surface is the object and the last the image: both are left out, and so are surfaces in air before
-and behind the lens that do nothing. Values are those with which the file was saved (solves and pickups done,
-one configuration).
+Each line is a keyword and values. ``SURF n`` starts a surface, with CURV the curvature, DISZ the distance to
+the next surface, GLAS the medium behind, DIAM the semi-diameter, and STOP marking the aperture stop. The first
+surface is the object and the last the image: both are left out, as are surfaces without effect in air in front
+of and behind the lens. Values are those saved in the file (solves and pickups resolved, one configuration).
 """
 
 from __future__ import annotations
@@ -45,12 +44,12 @@ _TYPES = {
     "PARAXIAL": "an ideal lens (use vcc.Lens)",
     "NONSEQCO": "a non-sequential component",
 }
-"""What the more common kinds of surfaces are, for messages; gradient-index kinds are GRADSUR1 and so on."""
+"""Common unsupported surface types, for messages; gradient-index types are GRADSUR1 and so on."""
 
 
 @dataclass
 class _Lines:
-    """The lines that matter of the file's head, or of one surface: keyword → (line number, values)."""
+    """The relevant lines of the file's head, or of one surface: keyword → (line number, values)."""
 
     number: int = -1
     found: dict[str, tuple[int, list[str]]] = field(default_factory=dict)
@@ -60,7 +59,7 @@ class _Lines:
 
 
 def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
-    """The prescription in a Zemax file.
+    """Read the prescription in a Zemax file.
 
     Raises:
         InputError: not a sequential Zemax file, a surface that is not a sphere or plane between glass and air,
@@ -75,7 +74,7 @@ def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
             f"{file} lists {len(surfaces)} surfaces (SURF): a Zemax lens has an object, surfaces and an image"
         )
     unit = _unit(head, file)
-    for surface in surfaces:  # before any glass is looked up: no catalogue helps a lens with mirrors
+    for surface in surfaces:  # before glasses are looked up: a lens with mirrors raises without a catalogue
         _check_supported(surface, file)
     makers = head.values("GCAT")
     listed = [_surface(surface, unit, makers, glasses, file, _place(file, surface)) for surface in surfaces[:-1]]
@@ -93,7 +92,7 @@ def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
 
 
 def _text(content: bytes) -> str:
-    """UTF-16 (as newer versions write), UTF-8, or what Windows wrote before."""
+    """Decode UTF-16 (newer versions), UTF-8, or the Windows code page (older versions)."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16", errors="replace")
     if content[1:2] == b"\0":
@@ -101,7 +100,7 @@ def _text(content: bytes) -> str:
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")  # only names and notes can hold such letters
+        return content.decode("cp1252", errors="replace")  # only names and notes can contain such characters
 
 
 def _grouped(text: str, file: Path) -> tuple[_Lines, list[_Lines]]:
@@ -149,14 +148,14 @@ def _number(lines: _Lines, keyword: str, column: int, place: str, file: Path) ->
 def _unit(head: _Lines, file: Path) -> float:
     values = head.values("UNIT")
     if not values:
-        raise InputError(f"{file} does not say its unit of length: it needs a line UNIT MM")
+        raise InputError(f"{file} does not state its unit of length: add a line UNIT MM")
     if values[0].upper() not in _UNITS:
         raise InputError(f"{file}: its unit of length {values[0]} is not known; known are {', '.join(_UNITS)}")
     return _UNITS[values[0].upper()]
 
 
 def _f_number(head: _Lines, file: Path) -> float | None:
-    """The stated f-number for a distant scene; a second value of 1 makes it the working one, which is not that."""
+    """The stated f-number for a distant scene; None for a working f-number (second value 1)."""
     values = head.values("FNUM")
     if not values or (len(values) > 1 and values[1] != "0"):
         return None
@@ -206,9 +205,9 @@ def _surface(surface: _Lines, unit: float, makers: list[str], glasses: Glasses, 
 
 
 def _medium(surface: _Lines, makers: list[str], glasses: Glasses, place: str, file: Path) -> tuple[str, float]:
-    """Name and index of what lies behind a surface; ("", 1.0) is air.
+    """Name and index of the medium behind a surface; ("", 1.0) is air.
 
-    The index that stands after a catalogue name is not used: files hold placeholders there.
+    The index after a catalogue name is ignored: files have placeholders there.
     """
     if "GLAS" not in surface.found:
         return "", 1.0
@@ -222,10 +221,10 @@ def _medium(surface: _Lines, makers: list[str], glasses: Glasses, place: str, fi
 
 
 def _without_idle_ends(surfaces: list[Surface]) -> tuple[list[Surface], float | None]:
-    """The lens proper, and the distance from its last surface to the image.
+    """The lens without idle surfaces at its ends, and the distance from its last surface to the image.
 
-    Surfaces in air that do not bend light are references of the design; before and behind the lens they
-    would only make it longer. The stop stays wherever it is.
+    Surfaces in air without refractive power are references of the design; in front of and behind the lens they
+    would only increase its length. The stop is kept in any position.
     """
     before = [1.0, *(surface.index for surface in surfaces)]
     counts = [

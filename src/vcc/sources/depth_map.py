@@ -88,8 +88,8 @@ class DepthMapScene:
         if not (distance > 0).all():
             where = tuple(int(n) for n in np.argwhere(~(distance > 0))[0])
             raise InputError(
-                f"depth is a distance above 0 m in every pixel, and at {where} (row, column) it is "
-                f"{distance[where]}; infinite stands for the sky"
+                f"depth must be above 0 m in every pixel, and at {where} (row, column) it is "
+                f"{distance[where]}; use infinity for the sky"
             )
         slopes = pair(slope_per_pixel)
         for name, value in (("slope_per_pixel", min(slopes)), ("reach", reach), ("edge", edge)):
@@ -158,7 +158,7 @@ class DepthMapScene:
         if not (vergence >= 0).all():
             lowest = cameras.disparity(math.inf)
             raise InputError(
-                f"disparities go down to {np.nanmin(disparity):g} pixels a view, and infinitely far things have "
+                f"disparities go down to {np.nanmin(disparity):g} pixels a view, and infinitely far points have "
                 f"{lowest:g}: a nearer focus distance of the cameras, or a larger spacing, makes them fit"
             )
         with np.errstate(divide="ignore"):
@@ -236,7 +236,7 @@ class DepthMapScene:
         away = max(abs(camera.x), abs(camera.y))
         if away > self.reach * (1 + 1e-9):
             raise InputError(
-                f"{view} is {away:g} m from the middle, and what lies behind things was made up for "
+                f"{view} is {away:g} m from the centre, and hidden surfaces were computed for "
                 f"{self.reach:g} m: give the scene reach={away:g}"
             )
         span = self._vergence.min(), self._vergence.max()

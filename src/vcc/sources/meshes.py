@@ -79,7 +79,7 @@ def _check_materials(path: Path) -> None:
     """Raise for an OBJ with missing material files or pictures: trimesh would silently load it as grey."""
     for library in _named_in(path, "mtllib"):
         if not is_file(library):
-            raise InputError(f"{path} names the material file {library.name}, which is not beside it")
+            raise InputError(f"{path} names the material file {library.name}, which is not in the same folder")
         for picture in _named_in(library, "map_Kd"):
             if not is_file(picture):
                 raise InputError(f"{library} names the picture {picture.name}, and there is no {picture}")

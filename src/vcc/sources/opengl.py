@@ -52,7 +52,7 @@ class Viewpoint:
         if not np.linalg.norm(back) > 0:
             raise InputError(f"a viewpoint looks from eye to target, and both are {self.eye}")
         if not np.linalg.norm(np.cross(self.up, back)) > 1e-9 * np.linalg.norm(back) * np.linalg.norm(self.up):
-            raise InputError(f"up is {self.up}, which does not say how pictures are turned: it is along the view")
+            raise InputError(f"up is {self.up}, which must not be parallel to the viewing direction")
 
     def array_from_scene(self) -> NDArray[np.float64]:
         """4×4 matrix from scene to array coordinates: metres, x right, y down, z against the viewing direction."""

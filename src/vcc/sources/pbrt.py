@@ -76,7 +76,7 @@ class Directive:
         while words:
             name = words.pop(0)
             if not name.startswith('"') or not words:
-                raise InputError(f"{self.name} {self.words[0]}: {name} is no parameter with a value")
+                raise InputError(f"{self.name} {self.words[0]}: {name} is not a parameter with a value")
             values = [words.pop(0)]
             if values == ["["]:
                 if "]" not in words:
@@ -119,7 +119,7 @@ class PbrtScene:
             cameras = sum(directive.name == "Camera" for directive in directives)
             if cameras != 1:
                 raise InputError(
-                    f"{path} has {cameras or 'no'} Camera before WorldBegin: one says where the views are"
+                    f"{path} has {cameras or 'no'} Camera before WorldBegin: exactly one must define the views"
                 )
             scene = cls(path, directives, world)
             scene.camera_from_world()  # raises for an animated camera
@@ -292,8 +292,8 @@ class PbrtRenderer:
                 )
             except OSError as error:
                 raise InputError(
-                    f"{error.filename or self._program}: {error.strerror or error}. PBRT needs a folder that can "
-                    "be written to, since a file for each view stands beside the scene for as long as it takes"
+                    f"{error.filename or self._program}: {error.strerror or error}. PBRT needs a writable "
+                    "folder, because a temporary file for each view is written next to the scene"
                 ) from error
             finally:
                 wrapper.unlink(missing_ok=True)
@@ -340,7 +340,7 @@ def _directives(text: str, path: Path, folder: Path, depth: int, included: list[
         starts = match is None or (token[0].isalpha() and token not in ("true", "false"))
         if starts and words:
             if not words[0][0].isalpha():
-                raise InputError(f"{path}: {words[0]} stands where a directive should; is it a file of PBRT?")
+                raise InputError(f"{path}: {words[0]} is not a directive; is this a file of PBRT?")
             directive = Directive(words[0], tuple(words[1:]))
             words = []
             if directive.name != "Include":

@@ -162,15 +162,15 @@ class _Cut:
             InputError: the values are not valid radiance, or do not fit the dtype.
         """
         if radiance.shape != shape:
-            raise InputError(f"came as an array of shape {radiance.shape}, and {shape} was asked for")
+            raise InputError(f"came as an array of shape {radiance.shape}, and {shape} was requested")
         if radiance.dtype.kind != "f":
             raise InputError(f"came as {radiance.dtype}: a renderer returns linear radiance, as float32")
         bad = ~(np.isfinite(radiance) & (radiance >= 0))
         if bad.any():
             place = tuple(int(n) for n in np.argwhere(bad)[0])
             raise InputError(
-                f"holds {int(bad.sum())} values that are no radiance (NaN, infinite or negative), the first at "
-                f"(row, column, channel) {place}: {radiance[place]}. Look at the scene's materials and lights"
+                f"holds {int(bad.sum())} values that are not valid radiance (NaN, infinite or negative), the "
+                f"first at (row, column, channel) {place}: {radiance[place]}. Check the materials and lights"
             )
         if self._kind.kind == "f":
             largest = float(np.finfo(self._kind).max)
@@ -191,7 +191,7 @@ class _Cut:
             warnings.warn(
                 ResultWarning(
                     f"{100 * self._cut / self._seen:.2g} % of the samples were brighter than radiance 1 and were "
-                    f'cut off there: {self._kind} holds no more. dtype="float16" does'
+                    f'clipped to it, the maximum of {self._kind}. dtype="float16" holds more'
                 ),
                 stacklevel=4,
             )

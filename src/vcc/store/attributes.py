@@ -91,8 +91,8 @@ class Attributes(Brief):
         """
         if not isinstance(stated, dict):
             raise InputError(
-                f'{path} is a Zarr group, and no light field: its attributes have no "{KEY}". How a store is '
-                "written says docs/store.md"
+                f'{path} is a Zarr group, but not a light field: its attributes have no "{KEY}". See '
+                "docs/store.md for the format of a store"
             )
         version = stated.get("format_version")
         if checks.whole_number_between(f"{path}: format_version", version, 1) > FORMAT_VERSION:

@@ -125,7 +125,7 @@ class Chunked:
         stream.seek(place)
         packed = stream.read(size) if size <= self._most else b""
         if len(packed) != size or size < BLOSC + CHECK:
-            raise ValueError(f"no chunk of {size:,} bytes lies at {place:,}")
+            raise ValueError(f"there is no chunk of {size:,} bytes at {place:,}")
         _check(packed, "a chunk")
         samples, _, whole = struct.unpack_from("<III", packed, 4)  # sizes in Blosc's header
         bytes_each = math.prod(self.chunk) * self.kind.itemsize
@@ -149,7 +149,7 @@ def _check(packed: bytes, what: str) -> None:
     import google_crc32c
 
     if google_crc32c.value(packed[:-CHECK]) != int.from_bytes(packed[-CHECK:], "little"):
-        raise ValueError(f"the checksum of {what} is another")
+        raise ValueError(f"the checksum of {what} does not match")
 
 
 def _copy(chunk: NDArray[Any], start: list[int], room: NDArray[Any], ends: list[Range]) -> None:

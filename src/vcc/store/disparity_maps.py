@@ -52,8 +52,8 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
         maps = DisparityMaps(values, views, str(array.attrs["source"]), unmatched=float(unmatched))
     except Exception as error:
         raise InputError(
-            f"the disparities in {folder} cannot be used: {shown(str(error), 300)}. Delete this folder, and "
-            "they are found again"
+            f"the disparities in {folder} cannot be used: {shown(str(error), 300)}. Delete this folder to "
+            "compute them again"
         ) from None
     return maps
 
@@ -66,7 +66,7 @@ def keep_maps(store: Path, maps: DisparityMaps) -> None:
         maps: the maps, with their source.
 
     Raises:
-        OSError: the disk refuses.
+        OSError: the write fails.
     """
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec

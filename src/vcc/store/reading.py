@@ -287,8 +287,8 @@ class StoredLightField(OnGrid):
             ) from error
         if samples.dtype.kind == "f" and not (samples.min() >= 0 and np.isfinite(samples.max())):
             raise InputError(
-                f"view ({row}, {column}) of {self.path} holds samples that are NaN, infinite or negative, which "
-                f"no radiance is: {file}. Make this view again"
+                f"view ({row}, {column}) of {self.path} holds samples that are NaN, infinite or negative, so "
+                f"not valid radiance: {file}. Make this view again"
             )
         return samples
 
@@ -311,8 +311,8 @@ class StoredLightField(OnGrid):
         """Text for missing views."""
         total = self.shape[0] * self.shape[1]
         if not missing:
-            return f"all {total} views are there, but the store was not finished: go on with what makes it"
-        way_out = "Copy or make the store again" if self.complete else "Go on with what makes it"
+            return f"all {total} views exist, but the store was not finished: continue the program that wrote it"
+        way_out = "Copy or make the store again" if self.complete else "Continue the program that wrote it"
         return (
             f"{len(missing)} of its {total} views are missing, by (row, column): "
             f"{first_few(missing, len(missing), 8)}. {way_out}; or take a part that is complete, stored[a:b, c:d]"
@@ -356,8 +356,8 @@ class StoredLightField(OnGrid):
             keep_maps(self.path, found)
         except OSError as error:
             warnings.warn(
-                f"the disparities found for {self.path} could not be kept there ({error.strerror or error}): they "
-                "are found again the next time",
+                f"the disparities found for {self.path} could not be saved there ({error.strerror or error}): "
+                "they will be computed again the next time",
                 CacheWarning,
                 stacklevel=2,
             )
@@ -427,12 +427,12 @@ def _opened_elsewhere(path: Path, attributes: Attributes, stated: str | None) ->
         found = open_store(path)
     except InputError as error:
         raise InputError(
-            f"the store is not found on {platform.node()}: {error}. All that work on it read it under one path"
+            f"the store is not found on {platform.node()}: {error}. All processes must use the same path"
         ) from error
     if stated is not None and (found.held is None or found.held.attributes != stated):
         raise InputError(
             f"on {platform.node()}, {path} holds another light field than the one that was opened: open it "
-            "again, and see that all that work on it read the same files"
+            "again, and make sure that all processes read the same files"
         )
     return replace(found, attributes=attributes)
 
@@ -479,12 +479,12 @@ def restored(folder: Path) -> None:
         back = put_back(folder)
     except OSError as error:
         raise InputError(
-            f"{folder} was being replaced when its writer was stopped, and what stood there cannot be put back "
+            f"{folder} was being replaced when its writer was stopped, and the old store cannot be restored "
             f"({error.strerror or error}): rename {error.filename} to {folder.name}"
         ) from error
     if back:
         warnings.warn(
-            f"{folder} was being replaced when its writer was stopped: what stood there before is back",
+            f"{folder} was being replaced when its writer was stopped: the old store was restored",
             ResultWarning,
             stacklevel=3,
         )
@@ -506,7 +506,7 @@ def read_metadata(folder: Path, mode: str = "r") -> tuple[Any, Attributes]:
     check_path(folder, "store")
     if not is_store(folder):
         raise InputError(
-            f"{folder} is no light field in a Zarr store: {'it is a file' if folder.is_file() else 'it'} "
+            f"{folder} is not a light field in a Zarr store: {'it is a file' if folder.is_file() else 'it'} "
             f"{'' if folder.is_file() else 'holds no zarr.json'}"
         )
     if not (folder / "zarr.json").is_file():

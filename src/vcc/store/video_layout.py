@@ -155,7 +155,7 @@ class VideoAttributes(Brief):
         """
         stated = video_attributes(path)
         if stated is None:
-            raise InputError(f"{path} is no video of light fields: vcc.store.open_store opens a store of one")
+            raise InputError(f"{path} is not a video of light fields: vcc.store.open_store opens a light field")
         version = checks.whole_number_between(f"{path}: format_version", stated.get("format_version"), 1)
         if version > VIDEO_VERSION:
             raise InputError(

@@ -130,8 +130,7 @@ class StoredVideo(Sequence[StoredLightField]):
         stated = "" if frame.held is None else frame.held.attributes
         if self._known.setdefault(place.number, stated) != stated:
             raise InputError(
-                f"{place.words}, of {self.path} is another one than before: it was replaced while the video was "
-                "read. Open the video again"
+                f"{place.words}, of {self.path} was replaced while the video was read. Open the video again"
             )
         return frame
 
@@ -166,7 +165,7 @@ def open_video(path: str | PathLike[str]) -> StoredVideo:
     folder = expanded(path)
     check_path(folder, "video")
     if not is_store(folder):
-        raise InputError(f"{folder} is no video of light fields: it holds no zarr.json")
+        raise InputError(f"{folder} is not a video of light fields: it holds no zarr.json")
     with reading(folder, "a video of light fields"):
         held = Held.now(folder, WHAT, _identity)
         # List frames before reading attributes: the writer states the grid before the first frame appears.

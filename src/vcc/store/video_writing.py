@@ -84,8 +84,8 @@ class VideoWriter:
 
         Raises:
             InputError: not a light field; a time that is not after the last; a grid that differs from earlier
-                frames (the difference is named); as in `vcc.store.convert`; this writer has ended; the disk
-                refuses. Earlier frames stay.
+                frames (the difference is named); as in `vcc.store.convert`; this writer has ended; the write
+                fails. Earlier frames stay.
         """
         check_is_light_field(light_field)
         kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
@@ -194,7 +194,7 @@ class VideoWriter:
             self._times.append(place.time)
             settle_names(self.path)
         except OSError as error:
-            raise InputError(f"{part} could not be settled: {error.strerror or error}") from error
+            raise InputError(f"{part} could not be flushed to the disk: {error.strerror or error}") from error
 
     def _following(self, time: float) -> float:
         """Check that a time is after all existing frames.
@@ -273,7 +273,7 @@ def create_video(
 
     Raises:
         InputError: the path is something else; an invalid argument; a video with another ``between``, or a
-            damaged one; another process writes it (named); the disk refuses.
+            damaged one; another process writes it (named); the write fails.
     """
     folder = expanded(path)
     if between is not None:
@@ -286,7 +286,7 @@ def create_video(
     restored(folder)
     there = folder.exists() and not (folder.is_dir() and not any(folder.iterdir()))
     if there and not is_video(folder):
-        raise InputError(f"{folder} is there already, and is no video of light fields: choose another name")
+        raise InputError(f"{folder} exists already, and is not a video of light fields: choose another name")
     lock = WriterLock(folder)
     try:
         clear_leftovers(folder, lock.patience)

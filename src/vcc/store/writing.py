@@ -105,7 +105,7 @@ class StoreWriter:
 
         Raises:
             InputError: the store is finished; no such view; another shape or type; samples that are NaN,
-                infinite, negative or too large; the disk refuses (full, no permission). Views written before
+                infinite, negative or too large; the write fails (full, no permission). Views written before
                 stay.
         """
         nv, nu = self.shape[:2]
@@ -136,7 +136,7 @@ class StoreWriter:
         """Mark the store as complete and open it.
 
         Raises:
-            InputError: views are missing (named), or the disk refuses.
+            InputError: views are missing (named), or the write fails.
         """
         if self.attributes.complete:
             self._lock.give_back()
@@ -175,7 +175,7 @@ class StoreWriter:
             return samples
         lowest, highest = samples.min(), samples.max()  # a NaN anywhere makes both NaN
         if not (lowest >= 0 and np.isfinite(highest)):
-            raise InputError(f"{what} holds samples that are NaN, infinite or negative, which no radiance is")
+            raise InputError(f"{what} holds samples that are NaN, infinite or negative, so not valid radiance")
         if highest > np.finfo(self.dtype).max:
             raise InputError(
                 f"{what} holds radiance of {highest:g}, and {self.dtype} ends at {np.finfo(self.dtype).max:g}: "
@@ -240,7 +240,7 @@ def create_store(
 
     Raises:
         InputError: an invalid shape, type or attribute; a path that is something else; a store of another
-            description (the difference is named); another process writes the store (named); the disk refuses.
+            description (the difference is named); another process writes the store (named); the write fails.
     """
     folder = Path(path).expanduser()
     frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
@@ -392,7 +392,7 @@ def in_one_piece(
         put: renames the finished store.
 
     Raises:
-        InputError: as raised within, with the final name of the store; the disk refuses; views are missing.
+        InputError: as raised within, with the final name of the store; the write fails; views are missing.
     """
     try:
         with begin() as writer:
@@ -489,17 +489,17 @@ def _writable(array: Any) -> Any:
 def _continued(folder: Path, wanted: Attributes) -> Attributes:
     """The attributes of an existing store that is to be continued."""
     if not folder.is_dir() or not is_store(folder):
-        raise InputError(f"{folder} is there already, and is no store: choose another name")
+        raise InputError(f"{folder} exists already, and is not a store: choose another name")
     _, found = read_metadata(folder, "r+")
     if wanted.description is None or found.description is None:
         raise InputError(
-            f"{folder} is there already{'' if found.complete else ', not finished'}, and without a description of "
-            "what its views depend on it is not gone on with: remove it, or choose another name"
+            f"{folder} exists already{'' if found.complete else ', not finished'}, and cannot be continued "
+            "without a description of what its views depend on: remove it, or choose another name"
         )
     found.description.get(SETTINGS, {}).setdefault("sample", "mean")  # for stores older than this setting
     if not same(wanted.description, found.description):
         raise InputError(
-            f"{folder} was made from another description, and views of two are never mixed. "
+            f"{folder} was made from another description, and their views must not be mixed. "
             f"{difference(found.description, wanted.description)}. Remove it, or choose another name"
         )
     return found
@@ -522,9 +522,9 @@ def _write_attributes(folder: Path, attributes: Attributes) -> None:
 
 def _check_replaceable(folder: Path, overwrite: bool) -> None:
     if not overwrite:
-        raise InputError(f"{folder} is there already: choose another name, or pass overwrite=True")
+        raise InputError(f"{folder} exists already: choose another name, or pass overwrite=True")
     if folder.is_symlink() or not (folder.is_dir() and is_store(folder)):
-        raise InputError(f"{folder} is there already and is no store: it is not overwritten. Choose another name")
+        raise InputError(f"{folder} exists already and is not a store: it is not overwritten. Choose another name")
 
 
 def _put_in_place(part: Path, folder: Path, overwrite: bool) -> None:

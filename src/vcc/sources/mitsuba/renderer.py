@@ -198,7 +198,7 @@ class MitsubaRenderer:
             return None
         raise InputError(
             f"the scene has {len(sensors) or 'no'} sensor{'s' * (len(sensors) != 1)}, and number {number} "
-            "(counted from 0) is to say where the views are: give to_world=… or a sensor that is there"
+            "(counted from 0) should define the position of the views: give to_world=… or an existing sensor"
         )
 
     def description(self) -> dict[str, Any]:
@@ -292,7 +292,7 @@ def _pose(to_world: ArrayLike) -> NDArray[np.float64]:
     turn = matrix[:3, :3]
     # Mitsuba stores matrices in single precision.
     if not np.allclose(turn.T @ turn, np.eye(3), atol=1e-5) or not np.allclose(matrix[3], (0, 0, 0, 1)):
-        raise InputError("to_world moves and turns, and must not scale: say how long a unit is by metres_per_unit")
+        raise InputError("to_world may move and rotate, but must not scale: set the unit with metres_per_unit")
     return matrix
 
 
