@@ -338,4 +338,4 @@ _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
         "diameter": _length(1.4 * wide, 2),
     },
 }
-"""What patterns, kernels and surfaces need, of the camera's length and light's width where they stand, metres."""
+"""Required parameters of patterns, kernels and surfaces, from the length of the camera and the width of the beam."""

@@ -209,7 +209,7 @@ class Results:
         return tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
-        """Keep a picture."""
+        """Keep an image."""
 
     def output_buffers(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
         """The contiguous memory in which to make the images of some cameras; None if there is none."""
