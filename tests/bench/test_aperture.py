@@ -118,7 +118,7 @@ def test_it_is_kept_undone_and_said_in_the_camera_file():
     client.do("export", what="toml")
     _, (data,) = client.until("file")
     text = data.decode()
-    assert text.startswith("# This file leaves out where the light field stood: z = -20 mm. In Python:\n")
+    assert text.startswith("# This file does not contain the position of the light field: z = -20 mm.")
     assert tables_of_text(text) == tomllib.loads(text)
     client.do("set", where=["aperture", "z"], value="1 m")
     assert "within the scene" in client.until("refused")[0]["words"]

@@ -49,8 +49,8 @@ def test_elements_keep_the_order_in_which_they_are_listed():
     ("where", "value", "words"),
     [
         (["sensor", "z"], "53", 'the camera: sensor: z is "53": a length needs a unit'),
-        (["sensor", "shape"], [10**4, 10**4], "a bench shows up to"),
-        (["sensor", "z"], float("inf"), "no value"),
+        (["sensor", "shape"], [10**4, 10**4], "a bench supports up to"),
+        (["sensor", "z"], float("inf"), "not a valid value"),
         (
             ["elements", 1, "pattern"],
             {"name": "mura", "prime": 10007},
@@ -64,7 +64,7 @@ def test_elements_keep_the_order_in_which_they_are_listed():
         (["elements", 7, "z"], "1 mm", "the bench: camera: elements has 2 entries: there is no number 7"),
         (["elements", 1, "pattern"], "secret.npy", "not among the files that may be read here"),
         (["elements", 0, "kind"], "lense", 'did you mean "lens"?'),
-        (["elements", 0, "name"], {"a": None}, "no value"),
+        (["elements", 0, "name"], {"a": None}, "not a valid value"),
         (["camera"], {}, "a bench has no"),
         (["light_field"], None, "a bench needs a light field"),
         (["exposure"], -1, "exposure"),

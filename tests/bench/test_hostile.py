@@ -25,7 +25,7 @@ def test_silly_values_are_taken_or_refused_in_words(given, count, seed):
             "focal_length of lens .main. is 4.9.*e-324 m, which no camera",
         ),
         (["sensor", "z"], "1e300 m", "sensor's z is 1e.300 m"),
-        (["sensor", "shape"], [1, 4194304], "a side on a bench has up to 16384 pixels"),
+        (["sensor", "shape"], [1, 4194304], "a bench supports up to 16384 pixels along a side"),
         (["sensor", "pitch"], "-1 mm", "pitch must be greater than 0 m, not -0.001"),
         (["sensor", "pitch"], "5 mm " * 20_000, r'sensor: pitch is "5 mm (5 mm )+…", which is not a length'),
         (["elements", 0, "name"], "x" * 1000, "has 1000 letters: take up to 200"),

@@ -302,7 +302,7 @@ def test_answers(client):
     client.do("ask", what="phase space", z="60 mm")
     assert "behind the sensor" in client.until("refused")[0]["words"]
     client.do("ask", what="why")
-    assert "a bench is asked for" in client.until("refused")[0]["words"]
+    assert "unknown question" in client.until("refused")[0]["words"]
 
 
 # --- exports ---
@@ -594,7 +594,7 @@ def test_a_picture_is_brought_as_a_pattern(client):
         ("a.png", b"no picture", "a.png"),
         ("a.png", imagecodecs.png_encode(np.zeros((129, 128), np.uint8)), "129×128"),
         ("../a.toml", b"", "a.toml"),
-        (None, b"", "with its name"),
+        (None, b"", "a file name and one buffer"),
     ],
 )
 def test_what_is_no_pattern_is_refused(client, name, data, words):
@@ -687,7 +687,7 @@ def test_a_film_that_is_broken_off_leaves_nothing(client, ending, tmp_path, monk
     while client.until("progress")[0]["done"] < 2:
         pass
     client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
-    assert "broken off" in client.until("refused", "file")[0]["words"]
+    assert "cancelled" in client.until("refused", "file")[0]["words"]
     assert client.at_rest()["turn"] == 9
     assert list(tmp_path.iterdir()) == []
 
@@ -725,7 +725,7 @@ def test_what_takes_long_is_broken_off_by_a_change(client, asked):
     with client.session.offered.turn.held():
         client.do("export", **asked)
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
-    assert "broken off" in client.until("refused", "file")[0]["words"]
+    assert "cancelled" in client.until("refused", "file")[0]["words"]
     assert client.at_rest()["turn"] == 9
 
 

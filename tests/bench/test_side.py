@@ -104,4 +104,4 @@ def test_it_is_json_whatever_is_infinite():
     for each in (START, START.changed(["sensor", "z"], "50 mm"), document):
         json.dumps(drawn(each), allow_nan=False)
         json.dumps(drawn(each, vcc.LightField(np.ones((1, 1, 4, 4)), vcc.Affine.identity())), allow_nan=False)
-    assert "Nothing real is sharp" in drawn(document)["words"][0]
+    assert "No real distance is in focus" in drawn(document)["words"][0]

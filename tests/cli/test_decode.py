@@ -181,7 +181,7 @@ def test_a_black_level_is_an_even_dark_frame():
     two = np.asarray(vcc.open_light_field("two.npz").values)
     np.testing.assert_allclose(two[..., 0], one, rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(two[..., 1], one / 2, rtol=1e-3, atol=2e-5)  # a whole number, rounded
-    assert "pixel by pixel" in refused(
+    assert "black level of each pixel" in refused(
         "decode", "raw.tif", *known, "--black", 5, "--dark", "dark.tif", "-o", "a.npz"
     )
 
@@ -454,7 +454,7 @@ REFUSED = {
     "raw.tif --color-filter RGGB": "says that its colour filter is None: leave out --color-filter",
     "said.tif --white silent.tif --transfer linear --upright": "leave out --transfer",
     "said.tif --white silent.tif": "silent.tif does not say what its numbers are: say it with",
-    "said.exr --white silent.tif --transfer linear --upright": "they are not of one kind",
+    "said.exr --white silent.tif --transfer linear --upright": "give recordings of the same kind",
     "silent.tif": "say it with --transfer linear (raw numbers, proportional to light) or srgb",
     "silent.tif --transfer linear": "say it with --upside-down (as light lies on a sensor) or --upright",
     "silent.tif --transfer srgb --upright --black 3": "--black counts raw numbers",

@@ -55,7 +55,7 @@ def test_what_is_no_executor_is_refused(files, tmp_path, monkeypatch, command, e
 def test_what_is_no_store_is_refused(files, tmp_path):
     done = run("capture", files[0], str(tmp_path), "-o", str(tmp_path / "p.npy"), "--executor", "threads")
     assert done.exit_code == 2
-    assert "--executor is for light fields in stores" in done.stderr
+    assert "--executor requires a light field in a store" in done.stderr
     assert "vcc convert" in done.stderr
 
 

@@ -56,7 +56,7 @@ def test_capture_takes_a_moving_camera_before_light_that_stays_and_before_a_vide
 
 def test_explain_says_what_changes(frames):
     said = run("explain", "camera.toml", "s.zarr").stdout
-    assert said.startswith("What changes over time\n  sensor.z goes evenly, 51 mm at 0 s, 53 mm at 20 ms\n")
+    assert said.startswith("What changes over time\n  sensor.z changes linearly, 51 mm at 0 s, 53 mm at 20 ms\n")
     assert "shutter opens and shuts by the code 1101 in 20 ms" in said
     assert str(load_moving_camera("camera.toml").explain(frames[0])).split("Sampling")[0] in said
     assert "What changes" not in run("explain", "still.toml", "s.zarr").stdout

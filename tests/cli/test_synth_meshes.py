@@ -59,7 +59,7 @@ def test_depth_maps(folder):
     given = ("synth", "depth", "room ü.png", "depth.png", "-o", "room.zarr", *SMALL, "--depth-unit", "1 mm")
     result = run(*given)
     assert result.exit_code == 0, result.output
-    assert "of the view in the corner was made up" in result.output
+    assert "of the corner view was filled in" in result.output
     cameras = CameraArray.over_aperture(
         20 * mm, 40 * deg, views=(2, 3), pixels=(24, 32), focus_distance=2 / (1 / 0.9 + 1 / 2)
     )

@@ -104,7 +104,7 @@ def test_what_is_kept_without_anybody_having_said_it_is_named(views, folder_of):
     kept = run(
         "info", folder_of(views, lambda j, i: f"view_{j}_{i}.png"), "--keep", "--spacing", "2 mm", "--quick"
     )
-    assert "parameters.cfg; assumed, since nobody said it: slope per pixel, focus distance." in kept.stdout
+    assert "parameters.cfg; assumed, because not stated: slope per pixel, focus distance." in kept.stdout
 
 
 def test_beside_a_camera_file_that_says_less(square_views, folder_of):

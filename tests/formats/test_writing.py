@@ -275,7 +275,7 @@ def test_a_folder_that_was_exposed_becomes_a_store_of_its_radiance(tmp_path, mon
         assert "--exposure is for folders" in refused("convert", "views", output, "--exposure", "auto")
         assert not (tmp_path / output).exists()
     said = run("info", "views", "--quick").output
-    assert "radiance, sRGB, upright, exposure 0.5, as the pictures say" in said
+    assert "radiance, sRGB, upright, exposure 0.5, as the pictures state" in said
 
 
 def test_cameras_that_are_not_square(tmp_path):

@@ -170,7 +170,7 @@ POINTS = 'name = "lines", times = ["0 s"], values = ["51 mm"]'
         ),
         ('sensor.z = { name = "lines", times = ["0 s"], values = [51] }', "value 1 of 1 is 51: a length needs"),
         ('sensor.z = { name = "lines", times = "0 s", values = [51] }', 'times is "0 s": it is a list'),
-        ('sensor.z = { name = "lines", times = ["1 s", "0 s"], values = ["51 mm", "52 mm"] }', "times ascend"),
+        ('sensor.z = { name = "lines", times = ["1 s", "0 s"], values = ["51 mm", "52 mm"] }', "must ascend"),
         ('sensor.z = { name = "lines", times = ["0 s"], values = ["-1 mm"] }', "at 0 s: sensor.z"),
         ('stop.pattern = { name = "steps", times = ["0 s"], values = ["none.png"] }', 'no file "none.png"'),
         ('stop.pattern = { name = "lines", times = ["0 s"], values = [{ name = "open" }] }', "finite number"),
@@ -178,7 +178,7 @@ POINTS = 'name = "lines", times = ["0 s"], values = ["51 mm"]'
         ('shutter = { name = "coded", code = 1101, exposure = "1 s" }', "as text of 0 and 1"),
         ('shutter = { name = "steps", times = ["0 s"], values = [3] }', "value 1 of 1 must be from 0 to 1"),
         ('shutter = { name = "steps", times = ["0 s"], values = [true] }', "share of the light"),
-        (f'{SWEEP}\n"sensor.z" = {{ {POINTS} }}', "sensor.z is there twice"),
+        (f'{SWEEP}\n"sensor.z" = {{ {POINTS} }}', "sensor.z is given twice"),
         (f"{SWEEP}\n[move]", 'unknown table "move"'),
     ],
 )
@@ -219,9 +219,9 @@ def test_what_changes_is_told_in_words(written):
         """
     )
     assert moving.listed() == [
-        "sensor.z goes evenly, 51 mm at 0 s, 53 mm at 90 ms",
+        "sensor.z changes linearly, 51 mm at 0 s, 53 mm at 90 ms",
         "stop.pattern switches, circle (diameter 8 mm) from 0 s on, 2×2 cells from 5 ms on",
-        "stop.decentre goes evenly, (1 mm, 0 m) at 0 s",
+        "stop.decentre changes linearly, (1 mm, 0 m) at 0 s",
         "shutter opens and shuts by the code 1101001 in 20 ms",
     ]
 
@@ -241,7 +241,7 @@ def test_a_moving_camera_is_explained_as_it_begins():
     field = vcc.LightField.from_views(values, spacing=2.4 * mm, slope_per_pixel=0.01)
     moving = MovingCamera(STILL, {"sensor.z": Lines([0, 90 * ms], [51 * mm, 53 * mm])})
     found = moving.explain(field)
-    assert found.startswith("What changes over time\n  sensor.z goes evenly, 51 mm at 0 s")
+    assert found.startswith("What changes over time\n  sensor.z changes linearly, 51 mm at 0 s")
     assert "sensor, 16×20 pixels" in found.split("z =        51 mm")[1]
     assert found.expected_seconds > 0
     assert found.plan.by_rays is False

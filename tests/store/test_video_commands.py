@@ -92,7 +92,7 @@ def test_capture_takes_a_moment_or_an_exposure(video):
         ("capture camera.toml v.zarr -o p.npy --start 1s", "1 s is not within the video, from 0 s to 0.04 s"),
         ("capture camera.toml v.zarr -o p.npy --exposure-time 1s", "the exposure goes from 0 s to 1 s, and"),
         ("capture camera.toml v.zarr -o p.npy --start 0s --spacing 1mm", "leave out --spacing"),
-        ("capture camera.toml v.zarr/000000_0.0 -o p.npy --start 0s", "is no video, and stays as it is: leave"),
+        ("capture camera.toml v.zarr/000000_0.0 -o p.npy --start 0s", "does not change over time: leave"),
         ("capture camera.toml none.zarr -o p.npy --start 0s", "there is no"),
         ("capture camera.toml empty.zarr -o p.npy --start 0s", "has no frame yet"),
         ("explain camera.toml v.zarr", "take one of its frames, v.zarr/000000_0.0"),

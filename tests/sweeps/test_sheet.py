@@ -52,7 +52,7 @@ def test_what_is_not_there_is_left_out():
     half = swept()
     half.done[1] = False
     assert [bool(each.images) for each in contact_sheet(half).axes] == [True] * 3 + [False] * 3
-    with pytest.raises(vcc.InputError, match="none of this sweep's pictures is there"):
+    with pytest.raises(vcc.InputError, match="none of this sweep's pictures is done"):
         contact_sheet(swept(done=False))
 
 

@@ -86,7 +86,7 @@ def test_a_list_takes_the_first_of_all_then_the_second(field):
     swept = vcc.sweep(camera(), field, listed({"sensor.z": "52mm, 53mm", "main.focal_length": [50 * mm, 51 * mm]}))
     assert (swept.axes, swept.shape, swept.table["sensor.z"].tolist()) == (("camera",), (2,), [52 * mm, 53 * mm])
     same_picture(swept[1], camera(z=53 * mm, focal_length=51 * mm).capture(field))
-    with pytest.raises(vcc.InputError, match=r"as many values of each.*sensor.z 2, main.z 1"):
+    with pytest.raises(vcc.InputError, match=r"equally many values of each.*sensor.z 2, main.z 1"):
         vcc.sweep(camera(), field, listed({"sensor.z": "52mm, 53mm", "main.z": [0.0]}))
 
 

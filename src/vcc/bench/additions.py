@@ -159,7 +159,7 @@ def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
         InputError: unknown kind, or z is not a length.
     """
     if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
-        raise InputError(f"there is no element of kind {shown(kind)}: there are {', '.join(ELEMENT_KINDS)}")
+        raise InputError(f"unknown kind of element {shown(kind)}: use one of {', '.join(ELEMENT_KINDS)}")
     place = units.parse(z, "length", "z")
     long, wide = max(train.sensor.z, 1e-3), _width_at(train, place)
     table: Json = {"kind": kind, "name": free_name(str(kind).replace("_", " "), names), "z": z}
@@ -265,7 +265,7 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
         InputError: the readers of camera files do not support it, or it has more than `MOST_BROUGHT` cells.
     """
     if not isinstance(name, str) or len(buffers) != 1:
-        raise InputError("a file is brought with its name and its bytes")
+        raise InputError("an upload consists of a file name and one buffer of bytes")
     with tempfile.TemporaryDirectory() as folder:
         ending = Path(name).suffix.lower()
         file = Path(folder) / f"brought{ending if ending.isascii() and len(ending) < 8 else ''}"
@@ -276,8 +276,8 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
     if values.ndim != 2 or values.size > MOST_BROUGHT:
         size, most = "×".join(map(str, values.shape)), math.isqrt(MOST_BROUGHT)
         raise InputError(
-            f"{shown(name)} has {size} cells, and a bench takes rows and columns of up to {most}×{most}: make it "
-            "smaller, or name the file in the camera file that the bench is started with"
+            f"{shown(name)} has {size} cells, and a bench supports up to {most}×{most}: reduce it, or name the "
+            "file in the camera file with which you start the bench"
         )
     return [[round(float(cell), 4) for cell in row] for row in values]
 
@@ -338,4 +338,4 @@ _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
         "diameter": _length(1.4 * wide, 2),
     },
 }
-"""What patterns, kernels and surfaces need, of the camera's length and light's width where they stand, metres."""
+"""Required parameters of patterns, kernels and surfaces, from the camera's length and the width of the beam."""

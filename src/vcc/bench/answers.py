@@ -67,14 +67,14 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
         return _mtf(message, train), []
     if what == "phase space":
         return _phase_space(message, train, light_field)
-    raise InputError(f"a bench is asked for {', '.join(QUESTIONS)}, not for {shown(what)}")
+    raise InputError(f"unknown question {shown(what)}: use one of {', '.join(QUESTIONS)}")
 
 
 def _distance(message: Json, train: Train) -> float:
     given = message.get("distance")
     distance = focused_distance(train) if given is None else units.parse(given, "length", "distance")
     if distance is None:
-        raise InputError("nothing real is sharp on the sensor: say how far away the point is")
+        raise InputError("no real distance is in focus: give the distance of the point")
     return distance
 
 
@@ -89,8 +89,8 @@ def _psf(message: Json, train: Train, finer: int = 1) -> PointSpread:
     if max(found.shape) <= finer * MOST_ACROSS:
         return found
     raise InputError(
-        f"the point's picture is {max(found.shape) // finer} pixels wide, and up to {MOST_ACROSS} are shown: take "
-        "a distance nearer to the one in focus"
+        f"the image of the point is {max(found.shape) // finer} pixels wide, and up to {MOST_ACROSS} are shown: "
+        "choose a distance nearer to the one in focus"
     )
 
 
@@ -101,7 +101,7 @@ def _point_spread(found: PointSpread) -> tuple[Json, list[bytes]]:
         "distance": None if np.isinf(found.distance) else found.distance,
         "brightest": brightest,
         "outside": found.outside,
-        "words": f"{found.shape[1]}×{found.shape[0]} pixels hold the light of a point; the brightest has "
+        "words": f"{found.shape[1]}×{found.shape[0]} pixels receive the light of a point; the brightest receives "
         f"{brightest:.1%} of it",
     }
     return told, [jpeg(found.values.astype(np.float32), brightest or 1.0)]

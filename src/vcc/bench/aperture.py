@@ -42,8 +42,8 @@ class Aperture:
         for place in self.metres:
             if not abs(place) <= FARTHEST:
                 raise InputError(
-                    f"the light field's aperture stands {short(abs(place))} away, and on a bench it is up to "
-                    f"{short(FARTHEST)}"
+                    f"the light field's aperture is {short(abs(place))} away from the entrance plane, and a bench "
+                    f"supports up to {short(FARTHEST)}"
                 )
 
     @property
@@ -74,7 +74,7 @@ class Aperture:
         nearest = math.inf if found is None else grid.distance_of(found[1])
         if 0 < nearest <= z:
             raise InputError(
-                f"the light field's nearest thing is {short(nearest)} before its views: with these at "
+                f"the nearest object of the light field is {short(nearest)} before its views: with the views at "
                 f"z = {short(z)} the camera would stand within the scene"
             )
 
@@ -119,7 +119,7 @@ def aperture_of(given: Any) -> Aperture:
     if given is None:
         return Aperture()
     if not isinstance(given, dict) or not set(given) <= {"z", "decentre"}:
-        raise InputError("the place of a light field's aperture is a table of z and decentre")
+        raise InputError("the aperture of a light field must be a table of z and decentre")
     across = given.get("decentre", [NOT_MOVED, NOT_MOVED])
     if not isinstance(across, list) or len(across) != 2:
         raise InputError('decentre of the light field is two lengths, right and down, such as ["1 mm", "0 mm"]')

@@ -165,7 +165,7 @@ def _answer(decoded: Decoded, distance: float, asked: Asked) -> Json:
     nv, nu, nt, ns = decoded.views.shape[:4]
     way = {"lenslets": "lenslets", "cosines": "a mask of cosines"}[decoded.decoder.way]
     return {
-        "words": f"{nv}×{nu} views of {nt}×{ns} pixels, told apart through {way}",
+        "words": f"{nv}×{nu} views of {nt}×{ns} pixels, separated by {way}",
         "remarks": list(decoded.remarks),
         "views": [nv, nu],
         "shape": [nt, ns],
@@ -196,7 +196,7 @@ def _distance(message: Json, train: Train) -> float:
     given = message.get("distance")
     distance = _focus(train) if given is None else units.parse(given, "length", "distance")
     if not distance > 0:
-        raise InputError(f"distance is {given}: it lies before the camera, above 0")
+        raise InputError(f"distance is {given}: it must be above 0, before the camera")
     return distance
 
 

@@ -60,8 +60,8 @@ class Views:
         for name, (first, last), there in (("rows", self.rows, shape[0]), ("columns", self.columns, shape[1])):
             if not 0 <= first <= last < there:
                 raise InputError(
-                    f"{name} of views are [{first}, {last}], and there are {there}: the first and the last of "
-                    f"those to be looked at, counted from 0 to {there - 1}"
+                    f"{name} of views are [{first}, {last}], and there are {there}: give the first and "
+                    f"the last one, counted from 0 to {there - 1}"
                 )
 
 
@@ -158,7 +158,7 @@ class Document:
         _check_sizes(self.camera, "the camera")
         elements = self.camera.get("elements", [])
         if isinstance(elements, list) and len(elements) > MOST_ELEMENTS:
-            raise InputError(f"a bench has room for {MOST_ELEMENTS} elements, not {len(elements)}")
+            raise InputError(f"a bench supports up to {MOST_ELEMENTS} elements, not {len(elements)}")
         return train_of_tables(self.camera, beside)
 
     def settled(self, beside: Beside) -> Document:
@@ -278,13 +278,13 @@ def _check_sizes(tree: Any, place: str) -> None:
         counts = shape if isinstance(shape, list) and all(type(each) is int and each > 0 for each in shape) else []
         if max(counts, default=0) > MOST_ALONG_A_SIDE:
             raise InputError(
-                f"{place}: shape is {shown(shape)}, and a side on a bench has up to {MOST_ALONG_A_SIDE} pixels: "
-                "take fewer; a picture of more is what vcc capture makes"
+                f"{place}: shape is {shown(shape)}, and a bench supports up to {MOST_ALONG_A_SIDE} pixels along a "
+                "side: use fewer; vcc capture makes larger images"
             )
         if math.prod(counts) > MOST_PIXELS:
             raise InputError(
-                f"{place}: shape is {shown(shape)}, and a bench shows up to {MOST_PIXELS} pixels: take fewer and "
-                "larger ones here; a picture of all is what vcc capture makes"
+                f"{place}: shape is {shown(shape)}, and a bench supports up to {MOST_PIXELS} pixels: use fewer "
+                "and larger ones here; vcc capture makes larger images"
             )
         prime = tree.get("prime")
         if type(prime) is int and prime * prime > MOST_CELLS:
@@ -295,7 +295,7 @@ def _check_sizes(tree: Any, place: str) -> None:
         for number, each in enumerate(tree, start=1):
             _check_sizes(each, f"{place} {number}")
     elif not isinstance(tree, str | int | float) or (isinstance(tree, float) and not math.isfinite(tree)):
-        raise InputError(f"{place} is {shown(tree)}, which is no value")
+        raise InputError(f"{place} is {shown(tree)}, which is not a valid value")
 
 
 def _views(given: Any) -> Views | None:

@@ -95,7 +95,7 @@ def _left_out(document: Document) -> str:
     """A comment with the parts of the state that a camera file cannot hold."""
     if not document.aperture.is_moved:
         return ""
-    said = f"This file leaves out where the light field stood: {document.aperture.in_words}. In Python:"
+    said = f"This file does not contain the position of the light field: {document.aperture.in_words}. In Python:"
     return "".join(f"# {line}\n" for line in [said, *document.aperture.in_python.split("\n")]) + "\n"
 
 
@@ -121,7 +121,7 @@ def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.flo
     elements = "".join(f"        {writer.made(element)},\n" for element in bench.train.elements)
     camera = f"camera = vcc.Camera(\n    [\n{elements}    ],\n    {writer.made(bench.train.sensor)},\n)"
     source = bench.source or (
-        'raise SystemExit("open here, as light_field, the one that was on the bench")  # and take this line away'
+        'raise SystemExit("open the light field of the bench here, as light_field")  # then remove this line'
     )
     views = bench.document.views
     if views is not None:
@@ -196,7 +196,7 @@ class _Writer:
             return self.quantity(value, unit)
         if value is None or isinstance(value, bool | int | float | str):
             return _number(value) if isinstance(value, float) else repr(value)
-        raise InputError(f"a {type(value).__name__} of Python's own cannot be written into a program")
+        raise InputError(f"a {type(value).__name__} cannot be written as Python code")
 
     def quantity(self, value: float, unit: str) -> str:
         """A number with the unit that makes it short, if the product is exactly the same number."""

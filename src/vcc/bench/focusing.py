@@ -34,10 +34,10 @@ def distance_at(train: Train, light_field: LightField, share: tuple[float, float
     """
     nv, nu, nt, ns = light_field.shape[:4]
     if nv * nu == 1:
-        raise InputError("one view alone shows no depth: there is nothing to focus by")
+        raise InputError("a single view has no parallax: its depth cannot be estimated")
     row, column = _pixel_of_middle_view(train, light_field, share)
     if not (0 <= row < nt and 0 <= column < ns):
-        raise InputError("the light field's middle view does not show what is there")
+        raise InputError("this point lies outside the light field's middle view")
     rows, first_row = _around(row, nt)
     columns, first_column = _around(column, ns)
     depth = depth_by_structure_tensor(light_field[:, :, rows, columns])
@@ -45,7 +45,7 @@ def distance_at(train: Train, light_field: LightField, share: tuple[float, float
     part = np.s_[max(down - NEAR, 0) : down + NEAR + 1, max(across - NEAR, 0) : across + NEAR + 1]
     weights = depth.confidence[part].astype(np.float64)
     if not weights.sum() > 0:
-        raise InputError("nothing there shows depth: click where there is some detail")
+        raise InputError("no depth can be estimated there: click where there is some detail")
     disparity = float((depth.disparity[part] * weights).sum() / weights.sum())
     distance = light_field.grid.distance_of(disparity)
     return distance if distance > 0 else math.inf
@@ -64,7 +64,7 @@ def _pixel_of_middle_view(train: Train, light_field: LightField, share: tuple[fl
     j, i = light_field.grid.middle_view
     by_pixel, fixed = _of_pixels(ray.linear, ray.offset, i, j)
     if abs(np.linalg.det(by_pixel)) < 1e-12 * np.abs(by_pixel).max() ** 2:
-        raise InputError("all pixels of a view land at one place here: the picture does not say what was clicked")
+        raise InputError("all pixels of a view land at one point here: a click does not identify an object")
     column, row = np.linalg.solve(by_pixel, place - fixed)
     return round(float(row)), round(float(column))
 

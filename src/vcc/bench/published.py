@@ -80,14 +80,14 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
 """Entries by name, each with a function that designs its camera for a light field before a lens."""
 
 LEFT_OUT: Mapping[str, str] = {
-    "good-apertures": "it compares many apertures of one lens, and is no single camera: open "
+    "good-apertures": "it compares many apertures of one lens, and is not a single camera: open "
     "coded-aperture-refocusing, and give its mask other cells",
     "light-field-rendering": "it renders views between those of a light field, and has neither lens nor sensor",
-    "diffuser-depth-of-field": "its diffusers are random rings by a formula of Python, which no camera file "
-    "holds: open wavefront-coding, and give its plate another surface",
-    "focal-sweep": "its sensor moves during the exposure, which no camera file says: move the sensor on the "
-    "bench, or export a film of a sweep of sensor.z",
-    "coded-exposure": "its shutter flutters while the scene moves, and the bench has one moment only",
+    "diffuser-depth-of-field": "its diffusers are random rings defined in Python, which a camera file cannot "
+    "hold: open wavefront-coding, and give its plate another surface",
+    "focal-sweep": "its sensor moves during the exposure, which the bench does not support: move the sensor on "
+    "the bench, or export a film of a sweep of sensor.z",
+    "coded-exposure": "its shutter flutters while the scene moves, and the bench shows static scenes only",
 }
 """Entries that are not on the bench, and why."""
 

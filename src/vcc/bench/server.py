@@ -158,7 +158,7 @@ class Clients:
             return
         await socket.accept()
         if not self._has_room(asked.get("key")):
-            await socket.close(TOO_MANY, f"{MOST_CLIENTS} look at this bench already")
+            await socket.close(TOO_MANY, f"this bench has {MOST_CLIENTS} clients already")
             return
         loop, there = asyncio.get_running_loop(), asyncio.Event()
 
@@ -227,7 +227,7 @@ async def _sent(socket: WebSocket, outbox: Outbox, there: asyncio.Event) -> None
         await there.wait()
         there.clear()
         if outbox.overfull:
-            await socket.close(TOO_MANY, "too much waits to be taken")
+            await socket.close(TOO_MANY, "the client reads too slowly")
             return
         for data in outbox.take():
             await socket.send_bytes(data)
@@ -275,7 +275,7 @@ def application(offered: Offered, door: Door, files: Mapping[str, bytes]) -> Sta
         ending = f".{path.rpartition('.')[2]}"
         asked = request.headers.get("host")
         if not door.token and _name_of(asked) not in OF_THIS_MACHINE:
-            return Response("This bench is for this machine.", 403)
+            return Response("This bench accepts connections from this machine only.", 403)
         if path not in pages or ending not in TYPES:
             return Response("There is no such page.", 404)
         return Response(pages[path], media_type=TYPES[ending], headers=HEADERS)
@@ -318,8 +318,10 @@ def listening(host: str, port: int) -> socket.socket:
     except OSError as error:
         made.close()
         if error.errno == errno.EADDRINUSE:
-            raise InputError(f"port {port} is taken: choose another with --port, or none for a free one") from None
-        raise InputError(f"{host} cannot be listened at: {error.strerror or error}") from None
+            raise InputError(
+                f"port {port} is in use: choose another one with --port, or omit --port for a free one"
+            ) from None
+        raise InputError(f"cannot listen on {host}: {error.strerror or error}") from None
     return made
 
 

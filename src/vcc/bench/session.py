@@ -214,7 +214,7 @@ class Session:
             except Exception as error:  # a bug: the client is notified, and the bench goes on
                 log.exception("a fault on the bench")
                 self._wanted = None
-                self._tell({"is": "failed", "words": f"a fault in the program: {type(error).__name__}: {error}"})
+                self._tell({"is": "failed", "words": f"a bug in the program: {type(error).__name__}: {error}"})
 
     def _has_to_do(self) -> bool:
         return self._closed or bool(self._inbox) or (self._wanted is not None and self._send is not None)
@@ -242,7 +242,7 @@ class Session:
         except Superseded:
             if message.get("what") in decoded.QUESTIONS:
                 return  # the client asks again, about the state at that time
-            self._refuse(message, InputError(f"{doing} was broken off: something else was asked for meanwhile"))
+            self._refuse(message, InputError(f"{doing} was cancelled by a newer request"))
 
     def _refuse(self, message: Json, error: InputError) -> None:
         where, turn = message.get("where"), _turn(message)
@@ -403,7 +403,7 @@ class Session:
         if document.aperture.is_moved and field.is_open:
             document.aperture.check(field.whole().grid)
         if document.noise and described.train.sensor.electronics is None:
-            raise InputError("noise is that of a sensor's electronics, and this sensor has none: add them first")
+            raise InputError("noise requires sensor electronics, and this sensor has none: add them first")
         return document, described
 
     def _element(self, message: Json) -> int:
@@ -593,7 +593,7 @@ class Session:
 
     def _picture_there(self) -> Taken:
         if self._taken is None:
-            raise InputError("there is no picture yet")
+            raise InputError("there is no image yet")
         return self._taken
 
     def _whole_picture(self) -> Taken:
@@ -694,7 +694,7 @@ def _in_words(error: InputError | MemoryError) -> InputError:
     if isinstance(error, InputError):
         return error
     return InputError(
-        "this machine has not enough memory for that: undo it, take fewer pixels, or elements that spread light "
+        "this machine has too little memory for this: undo it, or use fewer pixels, or elements that spread light "
         "less"
     )
 

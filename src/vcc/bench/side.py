@@ -258,7 +258,7 @@ def scene_distances(grid: Grid) -> dict[str, float]:
 
 def _words(train: Train, focus: float | None, grid: Grid | None) -> list[str]:
     """Sentences on what is in focus, the scene, the sensor's distance and the f-number of the first lens."""
-    sharp = "Nothing real is sharp on the sensor" if focus is None else f"Sharp: {distance_in_words(focus)}"
+    sharp = "No real distance is in focus" if focus is None else f"In focus: {distance_in_words(focus)}"
     said = [f"{sharp}."]
     if grid is not None and (scene := scene_distances(grid)):
         said.append(f"The scene: {' to '.join(map(distance_in_words, scene.values()))}.")

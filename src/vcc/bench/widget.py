@@ -28,7 +28,9 @@ def bench_of(camera: Train, light_field: LightField) -> Any:
     """A camera on the bench, as a widget; see `vcc.Camera.bench`."""
     check_is_light_field(light_field)
     if not isinstance(light_field, LightField):
-        raise InputError("the bench takes light fields in memory: pass stored.read(), or a part, stored[a:b, c:d]")
+        raise InputError(
+            "the bench needs a light field in memory: pass stored.read(), or a part, stored[a:b, c:d]"
+        )
     return _kind()(_offered(camera, light_field))
 
 

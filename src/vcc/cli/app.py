@@ -26,7 +26,7 @@ COMMANDS = {
     ),
     "expose": (
         "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"
-        "The camera file says how the sensor does so, in a table sensor.electronics.",
+        "The camera file describes the sensor in a table sensor.electronics.",
         'vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1',
         "vcc expose camera.toml views/ -o raw.npy --picture picture.png",
     ),
@@ -43,7 +43,7 @@ COMMANDS = {
         'vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"',
     ),
     "plot": (
-        "Draw a camera from the side with rays, or a light field's way through it in phase space.",
+        "Draw a camera from the side with rays, or the path of a light field through it in phase space.",
         "vcc plot camera.toml -o camera.svg",
         "vcc plot camera.toml --phase-space --light-field views/",
     ),
@@ -68,9 +68,9 @@ COMMANDS = {
         "vcc demo --light-field views/",
     ),
     "convert": (
-        "Put a light field into a store (Zarr), or into files of another format.\n\n"
-        "A store keeps samples bit for bit, with their cameras, opens at once and is read in parts: a camera "
-        "takes a picture of it in whatever memory there is (--memory-limit). It appears when it is whole.",
+        "Convert a light field to a store (Zarr), or to files of another format.\n\n"
+        "A store keeps samples bit for bit, with their cameras. It opens at once and is read in parts, so that a "
+        "capture fits in any memory (--memory-limit). It appears when it is complete.",
         'vcc convert views/ scene.zarr --spacing "1 mm"',
         "vcc convert views/ small.zarr --lossy jpegxl --quality 90",
         "vcc convert scene.zarr half.zarr --dtype float16",
@@ -79,15 +79,15 @@ COMMANDS = {
     ),
     "decode": (
         "Turn the raw recording of a plenoptic or mask-modulated camera into a light field.\n\n"
-        "Where lenslets' micro-images are is taken from --centres, or found in --white, or follows from --camera. "
-        "Through a mask of cosines, carriers follow from --camera.",
+        "The positions of lenslets' micro-images come from --centres, --white or --camera. For a mask of cosines, "
+        "the carriers come from --camera.",
         "vcc decode raw.tif --camera camera.toml -o field.zarr",
         "vcc decode raw.tif --white white.tif --dark dark.tif --views 9 -o views",
         "vcc decode photo.lfp --white white.lfp -o field.zarr",
         "vcc decode raw.png --centres centres.csv --color-filter BGGR -o field.zarr",
     ),
     "refocus": (
-        "Refocus a light field on one distance, on many, or on all.",
+        "Refocus a light field at one distance, at many, or at all.",
         'vcc refocus views/ --distance "1.2 m" -o picture.png',
         'vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4',
         "vcc refocus views/ --all-in-focus -o sharp.png",
@@ -108,14 +108,13 @@ COMMANDS = {
 
 RENDERERS = {
     "mitsuba": (
-        "Render any scene of Mitsuba 3. Its own sensor says where the middle of the views stands and looks.",
+        "Render any scene of Mitsuba 3. Its own sensor defines the position and direction of the middle view.",
         'vcc synth mitsuba scene.xml -o out.zarr --views 20 20 --pixels 500 500 --aperture "20 mm" '
         '--field-of-view "40 deg" --focus-distance "1.3 m" --samples 64',
     ),
     "demo": (
-        "Render a scene of ours by Mitsuba: glass, gold and gloss, at several depths.\n\n"
-        "The example takes about two minutes on two cores, and three times as long where the system has no "
-        "LLVM 16 or newer.",
+        "Render a built-in scene with Mitsuba: glass, gold and gloss, at several depths.\n\n"
+        "The example takes about two minutes on two cores, and three times as long without LLVM 16 or newer.",
         "vcc synth demo still-life -o still-life.zarr --views 9 9 --pixels 200 300",
     ),
     "planes": (
@@ -133,13 +132,13 @@ RENDERERS = {
         "blender scene.blend --background --python views.py",
     ),
     "depth": (
-        "Make the views around a picture from its depth; what no picture shows is made up behind edges.",
+        "Make the views around a picture from its depth; hidden parts behind edges are filled in.",
         'vcc synth depth room.png room-depth.exr -o room.zarr --field-of-view "60 deg"',
         'vcc synth depth kinect.png kinect-depth.png -o out.zarr --depth-unit "1 mm"',
         'vcc synth depth view.png disparity.pfm -o out.zarr --meaning disparity --focus-distance "4 m"',
     ),
     "opengl": (
-        "Draw meshes by OpenGL, textured and simply lit: quick, without shadows, mirrors and glass.",
+        "Draw meshes with OpenGL, textured and simply lit: fast, without shadows, mirrors and glass.",
         'vcc synth opengl teapot.glb -o teapot.zarr --field-of-view "40 deg"',
         'vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"',
     ),
@@ -186,7 +185,7 @@ app = _commands(
     "vcc.cli",
     COMMANDS,
     "Virtual Computational Camera: what would a camera with unconventional optics record? "
-    "Give it a light field and a camera file, get the picture on its sensor.",
+    "Give it a light field and a camera file, and get the image on its sensor.",
     "Try:  vcc demo  ·  Help on a command:  vcc capture --help",
 )
 app.command(
@@ -194,14 +193,14 @@ app.command(
         "synth",
         "vcc.cli.synth",
         RENDERERS,
-        "Make a light field of a scene: choose what renders it. Views are written as they are done, and the same "
-        "command goes on where it was stopped.",
+        "Render a light field of a scene with one of these renderers. Views are written as they are done, and the "
+        "same command resumes an interrupted run.",
         "Help on a renderer:  vcc synth planes --help",
         place=len(COMMANDS),
     )
 )
 app.register_install_completion_command(
-    help="Let the shell complete commands, options and files: bash, zsh or fish, whichever this is.",
+    help="Install completion of commands, options and files for this shell: bash, zsh or fish.",
     group="Options",
 )
 

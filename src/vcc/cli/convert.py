@@ -92,7 +92,7 @@ def convert(
     storing: Storing = Storing(),
     reading: Reading = Reading(),
 ) -> None:
-    """Put a light field into a store (Zarr), or into files of another format.
+    """Convert a light field to a store (Zarr), or to files of another format.
 
     Args:
         frame_rate: Frames per second: make a video from LIGHT_FIELD, a folder with one light field per frame
@@ -104,7 +104,7 @@ def convert(
     if frame_rate is not None:
         if output.suffix.lower() != ".zarr" or kind or overwrite:
             raise InputError(
-                "--frame-rate makes a video, which goes on where it is there: end OUT in .zarr, and leave out "
+                "--frame-rate makes a video, or appends to an existing one: end OUT in .zarr, and leave out "
                 "--kind and --overwrite"
             )
         exposed(exposure, "zarr")
@@ -263,6 +263,6 @@ def numbered_frames(folder: Path) -> list[Path]:
         if after != before + 1:
             raise InputError(
                 f"{folder}: frame {before + 1} is missing between {frames[before].name} and {frames[after].name}. "
-                "Frames at times of their own are appended from Python, by vcc.store.create_video"
+                "To append frames at arbitrary times, use vcc.store.create_video in Python"
             )
     return [frames[number] for number in sorted(frames)]

@@ -37,8 +37,8 @@ def decode(
     raw: Annotated[
         Path,
         Parameter(
-            help="The recording: a picture that says what its numbers are, as vcc expose and vcc capture write "
-            "it; a real camera's, with --transfer and --upside-down or --upright; or a Lytro file, .lfp or .lfr."
+            help="The recording: a picture that states its encoding, as written by vcc expose and vcc capture; "
+            "a real camera's, with --transfer and --upside-down or --upright; or a Lytro file, .lfp or .lfr."
         ),
     ],
     /,

@@ -65,7 +65,7 @@ def through_lenslets(
         InputError: the positions of the micro-images are unknown, or see `vcc.recover.decode_plenoptic`.
     """
     if given.dark is not None and recorded.black is not None:
-        raise InputError("--black is said pixel by pixel by --dark: leave it out")
+        raise InputError("--dark gives the black level of each pixel: leave out --black")
     raw = read_raw(path, camera, given.color_filter, recorded)
     others = [
         None if each is None else read_raw(each, camera, given.color_filter, recorded)
@@ -123,8 +123,8 @@ def _lattice(
     if camera is not None:
         return LensletGrid.of_camera(camera), "by the camera file"
     raise InputError(
-        f"where the micro-images of {raw.path.name} are is not known: give --white (a recording of something "
-        "evenly white by the same camera), --centres or --camera"
+        f"the positions of the micro-images of {raw.path.name} are unknown: give --white (a recording of an "
+        "evenly white surface by the same camera), --centres or --camera"
     )
 
 

@@ -58,8 +58,8 @@ class Executing:
         self.check_name()
         if self.executor is not None and not is_store(light_field):
             raise InputError(
-                f"--executor is for light fields in stores, whose blocks each reads for itself, and {light_field} "
-                f"is none: vcc convert {light_field} scene.zarr makes one; or leave --executor out"
+                f"--executor requires a light field in a store, and {light_field} is not a store: convert it with "
+                f"vcc convert {light_field} scene.zarr, or leave --executor out"
             )
 
     @contextmanager

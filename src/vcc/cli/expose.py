@@ -42,8 +42,8 @@ def expose(
     optics = load_camera(camera)
     if optics.sensor.electronics is None:  # checked before the light field is read
         raise InputError(
-            f"{camera} does not say how its sensor records: add a table [sensor.electronics], which may be "
-            "empty for an ordinary one. Irradiance can be had without (vcc capture)"
+            f"{camera} has no sensor electronics: add a table [sensor.electronics], which may be empty for an "
+            "ordinary sensor. vcc capture computes irradiance without it"
         )
     executing.check(light_field)
     field = reading.light_field(light_field)

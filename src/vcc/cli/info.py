@@ -98,7 +98,7 @@ def _keep(path: Path, how: Reading) -> str:
     if not assumed:
         return f"{file}"
     names = ", ".join(name.replace("_", " ") for name in assumed)
-    return f"{file}; assumed, since nobody said it: {names}. It will not be said again: correct it there"
+    return f"{file}; assumed, because not stated: {names}. Later runs do not report this: correct it in the file"
 
 
 def _of_files(path: Path, quick: bool, picture: Path | None, how: Reading) -> dict[str, str]:
@@ -216,11 +216,11 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         + assumed("focus_distance"),
     }
     if facts.metadata.said:
-        lines["numbers"] = f"{facts.metadata.in_words}, as the pictures say"
+        lines["numbers"] = f"{facts.metadata.in_words}, as the pictures state"
     if facts.unknown:
         options = ", ".join(f"--{name.replace('_', '-')}" for name in facts.unknown)
         keep = "; with --keep they are kept in the folder" if facts.files else ""
-        lines["assumed"] = f"distances and blur are only as right as this: give {options} if you know better{keep}"
+        lines["assumed"] = f"distances and blur depend on these assumptions: give {options} if you know them{keep}"
     if facts.missing:
         lines["missing"] = _missing(facts.missing, facts.rows * facts.columns)
     if facts.disparity_range is not None:
@@ -265,7 +265,7 @@ def _disparities(field: LightField, facts: FolderInfo) -> str:
     low, high = known
     source = "measured" if facts.disparity_range is None else "stated"
     words = f"{low:.3g} to {high:.3g} pixels per view ({source}): {places_of(field.grid, low, high)}"
-    return words + (" if what is assumed is right" if facts.unknown else "")
+    return words + (" if the assumptions are right" if facts.unknown else "")
 
 
 def _sparse_disparities(sparse: Any, facts: FolderInfo) -> str:

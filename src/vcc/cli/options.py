@@ -26,7 +26,7 @@ from vcc.light_field import LightField
 from vcc.plan.how import BetweenViews, EngineName, How, Interpolation, Method  # noqa: F401  # How's fields name them
 from vcc.store import StoredLightField, StoredVideo, is_store, is_video, open_store, open_video
 
-MAKING = Group("Making the picture", sort_key=2)
+MAKING = Group("Making the image", sort_key=2)
 READING = Group("Reading the light field", sort_key=3)
 
 # --- values ---
@@ -171,20 +171,20 @@ File = Annotated[Path, Parameter(metavar="FILE")]
 OutputFile = Annotated[
     Path,
     Parameter(
-        help="What to make: a store (.zarr); or .npz, .mat, .png (all views in one), .mp4 (a flight through the "
+        help="The output: a store (.zarr); or .npz, .mat, .png (all views in one), .mp4 (a flight through the "
         "views), a folder (no ending).",
     ),
 ]
 FolderNames = Annotated[
     Literal["hci", "views"],
-    Parameter(help="Names of views in a folder: as the HCI benchmark has them (the default), or row and column."),
+    Parameter(help="Names of views in a folder: as in the HCI benchmark (the default), or row and column."),
 ]
 FileKind = Annotated[
     Literal["hci", "views", "eslf", "mosaic"],
     Parameter(
-        help="Of a folder, the names of its views: as the HCI benchmark has them (hci, the default), or row and "
-        "column (views). Of one .png: the blocks of views of lenslets side by side (eslf, the default), or whole "
-        "views (mosaic)."
+        help="For a folder, the names of its views: as in the HCI benchmark (hci, the default), or row and column "
+        "(views). For one .png: the blocks of views of lenslets side by side (eslf, the default), or whole views "
+        "(mosaic)."
     ),
 ]
 ViewExposure = Annotated[
@@ -192,10 +192,10 @@ ViewExposure = Annotated[
     quantity("auto|NUMBER", auto_or(above_zero), written=lambda factor: f"{factor:g}"),
     Parameter(
         help="Factor to the brightness of a folder's or film's views; auto shows the brightest parts white. Other "
-        "formats keep the numbers, and take none."
+        "formats keep the numbers, and do not support it."
     ),
 ]
-Overwrite = Annotated[bool, Parameter(help="Replace what has that name.")]
+Overwrite = Annotated[bool, Parameter(help="Replace an existing output.")]
 
 
 def exposed(exposure: float | Literal["auto"], kind: Kind) -> dict[str, Any]:
@@ -327,8 +327,8 @@ class Making(How):
     scene_distance: Annotated[
         Length | None,
         Parameter(
-            help='Distance of the scene before the camera, "1.2 m", by which interpolation between views goes. '
-            "Default: what the light field states or shows."
+            help='Distance of the scene before the camera, "1.2 m", for the interpolation between views. Default: '
+            "stated by the light field, or measured."
         ),
     ] = None
     refine: Annotated[int | Literal["auto"], quantity("auto|NUMBER", auto_or(whole_number))] = "auto"
@@ -338,8 +338,8 @@ class Making(How):
     memory_limit: Annotated[
         Size | None,
         Parameter(
-            help='Of a light field in a store: what reading it in pieces may take, "1.5 GB". Default: 1 GiB. '
-            "Smaller pieces take more time by rays, all of which are traced for each piece."
+            help='Memory for reading a light field in a store in pieces, "1.5 GB". Default: 1 GiB. With rays, '
+            "smaller pieces take more time, because all rays are traced for each piece."
         ),
     ] = None
 

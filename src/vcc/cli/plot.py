@@ -24,7 +24,7 @@ def plot(
     slice: Annotated[str | None, Parameter(metavar="NAMES")] = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Draw a camera from the side with rays, or a light field's way through it in phase space.
+    """Draw a camera from the side with rays, or the path of a light field through it in phase space.
 
     Args:
         output: The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, in the current

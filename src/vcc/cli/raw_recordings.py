@@ -131,8 +131,7 @@ def check_alike(raw: RawRecording, other: RawRecording | None) -> None:
     if other is not None and (raw.metadata is None) != (other.metadata is None):
         says, silent = (raw, other) if other.metadata is None else (other, raw)
         raise InputError(
-            f"{says.in_words}, and {silent.path} does not say what its numbers are: they are not of one kind. "
-            "Give recordings that were written alike"
+            f"{says.in_words}, and {silent.path} does not state its encoding: give recordings of the same kind"
         )
 
 

@@ -58,7 +58,7 @@ def refocus(
     memory_limit: Size | None = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Refocus a light field on one distance, on many, or on all.
+    """Refocus a light field at one distance, at many, or at all.
 
     Args:
         output: An image, .png, .tif, .exr or .npy; for a focal stack a film, .mp4 or .gif.

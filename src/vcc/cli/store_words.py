@@ -67,9 +67,9 @@ def places_of(grid: Grid, low: float, high: float) -> str:
     """Distances of objects with these disparities, pixels per view along u, as text; also beyond infinity."""
     near, far = grid.distance_of(high), grid.distance_of(low)
     if 0 < near < far:
-        return f"things {short(near, digits=3)} to {_far(far)} away"
+        return f"objects {short(near, digits=3)} to {_far(far)} away"
     if near > 0:
-        words, beyond = f"things {short(near, digits=3)} to infinity away", abs(grid.disparity_of(math.inf) - low)
+        words, beyond = f"objects {short(near, digits=3)} to infinity away", abs(grid.disparity_of(math.inf) - low)
         return words if beyond <= BEYOND else f"{words}, and {beyond:.2g} pixels per view beyond. {WRONG}"
     return f"all beyond infinity: light that a lens has gathered; or {WRONG[0].lower()}{WRONG[1:]}"
 

@@ -96,8 +96,8 @@ class MakingMany(Executing):
                 check_portable(light_field)
         except InputError as error:
             raise InputError(
-                f"{path} is read into memory, and is too large to be sent to all that work: vcc convert {path} "
-                "scene.zarr makes a store, which each reads for itself; or leave --executor out"
+                f"{path} is too large to be sent to all tasks: convert it with vcc convert {path} scene.zarr to a "
+                "store, which each task reads itself, or leave --executor out"
             ) from error
 
 
@@ -141,7 +141,7 @@ def sweep(
     table = None if table is None else check_output(table, ENDINGS)
     sheet = None if sheet is None else check_output(sheet, DRAWINGS)
     if sheet is not None and not stored:
-        raise InputError("--sheet shows pictures, and a table alone keeps none: let --output end in .zarr")
+        raise InputError("--sheet shows images, and a table alone keeps none: let --output end in .zarr")
     executing.check_name()
     optics = load_camera(camera)
     asked = Design(dict(set), design, count, seed, camera.parent)

@@ -49,11 +49,11 @@ class Timing(Given):
                 '--exposure-time "20 ms"'
             )
         if stays and self.start is not None:
-            raise InputError(f"{light_field} is no video, and stays as it is: leave out --start")
+            raise InputError(f"{light_field} is no video, and does not change over time: leave out --start")
         if given and stays and not moves:
             raise InputError(
-                f"{light_field} is no video, {camera} has no table [moving]: what stays as it is takes no time, "
-                f"leave out {', '.join(given)}"
+                f"{light_field} is no video, and {camera} has no table [moving]: nothing changes over time, leave "
+                f"out {', '.join(given)}"
             )
 
     def of(self, light: Any) -> tuple[float, float]:

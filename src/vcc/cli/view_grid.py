@@ -21,7 +21,7 @@ from vcc.plot.style import NOTHING, SMALL, TEXT, TITLE, new_axes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_SHEET = 1400  # pixels: about the longer side of the picture of the grid
+_SHEET = 1400  # pixels: about the longer side of the drawing
 _NARROWEST = 190  # pixels, so that title and labels fit
 _SMALLEST, _LARGEST = 24, 260  # pixels of the longer side of a view in it
 

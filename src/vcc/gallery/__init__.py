@@ -1,8 +1,8 @@
-"""Published computational cameras, each rebuilt from its optics to the decoded result, beside its claim.
+"""Published computational cameras, each rebuilt from the optics to the decoded result and compared with its claim.
 
-``entry("biprism-stereo").run()`` takes the built-in scene, or a light field of your own, through one of them;
-`write_entry` makes a page of what came of it, `write_entry_markdown` one for a site. One file a camera; `ENTRIES`
-lists them.
+``entry("biprism-stereo").run()`` runs one of them on the built-in scene, or on a light field of your own.
+`write_entry` writes a page of the result, `write_entry_markdown` one for a site. Each camera is a module;
+`ENTRIES` lists them.
 """
 
 from vcc.gallery.entry import Entry, Finding, Picture, Result

@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OPENING = 1.5 * mm
-"""Of the camera's lens: small, so that each place of the sensor looks through one face."""
+"""Opening of the camera's lens: small, so that each point of the sensor looks through one face."""
 REACH = 0.9
-"""How much of the light field's half width the camera looks through."""
+"""Share of the light field's half width that the camera uses."""
 BLOCK = 13
-"""Pixels a side of the blocks that are matched."""
+"""Side of the blocks to match, pixels."""
 STEP = 2
-"""From block to block, pixels."""
+"""Step between blocks, pixels."""
 CONFIDENT = 0.9
 """Least confidence of blocks that count."""
 FEWEST = 20
-"""Blocks of which an error is stated."""
+"""Least number of blocks for an error to be reported."""
 
 
 def run(bench: Bench, progress: Progress) -> Result:
@@ -73,13 +73,13 @@ def run(bench: Bench, progress: Progress) -> Result:
 
 
 def designed(bench: Bench) -> Camera:
-    """A biprism, a lens and a sensor that look through most of the light field's aperture and angle."""
+    """A biprism, a lens and a sensor that use most of the light field's aperture and angle."""
     linear = bench.light_field.frame.linear
     rows, columns = bench.light_field.shape[2:4]
     slopes = abs(float(linear[2, 2])), abs(float(linear[3, 3]))
     inside = REACH * APERTURE / 2 - OPENING / 2
     convergence = abs(float(linear[2, 0] / linear[0, 0]))
-    # At the light field's rim the views have moved on by u/F: what is left is seen from everywhere.
+    # At the light field's rim the views are shifted by u/F: use only the part that is visible from everywhere.
     half_angle = slopes[0] * columns / 2 - inside * convergence
     to_lens = inside / half_angle
     deflection = half_angle / 2
@@ -96,7 +96,7 @@ def designed(bench: Bench) -> Camera:
 def _against_the_scene(
     scene: PlanesScene, camera: Camera, depth: StereoDepth, trusted: NDArray[np.bool_]
 ) -> list[Finding]:
-    """Errors of the blocks that show one plane of the scene and nothing else, plane by plane."""
+    """Errors of the blocks that show only one plane of the scene, plane by plane."""
     stereo, pitch = BiprismStereo.of(camera), camera.sensor.pitches[1]
     numbers = []
     for number, plane in enumerate(scene.planes):
@@ -118,10 +118,10 @@ def _against_the_scene(
 
 
 def shows_only(scene: PlanesScene, camera: Camera, number: int, rows: Array, columns: Array) -> NDArray[np.bool_]:
-    """Which blocks show nothing but one plane of the scene.
+    """Which blocks show only one plane of the scene.
 
     Args:
-        scene: what the camera looks at.
+        scene: before the camera.
         camera: see `designed`.
         number: of the plane, nearest first.
         rows: of the blocks' middles, pixels of the sensor.
@@ -138,7 +138,7 @@ def shows_only(scene: PlanesScene, camera: Camera, number: int, rows: Array, col
     seen = np.ones((len(rows), len(columns)), bool)
     for nearer, plane in enumerate(scene.planes[: number + 1]):
         z = plane.distance
-        # Seen through a face, things stand δ·Z to its side.
+        # Through a face, objects appear displaced by δ·Z.
         across = -x * (z + stereo.ahead) / stereo.behind + np.sign(x) * stereo.deflection * z
         down = -y * (z + stereo.ahead) / stereo.behind
         opacity = plane.at(across[None, :], down[:, None])[..., 3]
@@ -152,7 +152,7 @@ def _depth_figure(
 ) -> Figure:
     figure = figures.new_figure(4.6, 4.6)
     picture, axes = figure.subplots(1, 2)
-    # The blocks lie on the half at x > 0 as light lands: turned upright, the left one.
+    # The blocks lie on the half at x > 0 of the sensor: the left half of the upright image.
     rows, columns = recording.shape[:2]
     top, left = (int(n - 1 - at[-1]) for n, at in ((rows, depth.rows), (columns, depth.columns)))
     bottom, right = (int(n - 1 - at[0]) for n, at in ((rows, depth.rows), (columns, depth.columns)))

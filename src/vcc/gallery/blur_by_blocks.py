@@ -1,4 +1,4 @@
-"""A camera with a code in its aperture, and how its recording is read: the blur of each block, all in focus."""
+"""A camera with a coded aperture, and what its recording yields: the blur of each block, an all-focus image."""
 
 from __future__ import annotations
 
@@ -36,39 +36,44 @@ Flags = NDArray[np.bool_]
 OPENING = 50 * mm / 1.8
 """Levin et al. put the code into a lens of 50 mm, f/1.8."""
 VIEWS = 2 * LEVIN.shape[0]
-"""Views a side in which the built-in scene is seen: two for each cell of the code."""
+"""Views along a side for the built-in scene: two per cell of the code."""
 LARGEST = 340
-"""Pixels a side of the sensor, at most: a light field of someone's own is seen by larger pixels if it has more."""
+"""Largest side of the sensor, pixels; a light field of the user with more pixels gets larger sensor pixels."""
 WIDEST = 24
-"""Pixels of blur, at most, likewise."""
+"""Largest blur, pixels, likewise."""
 NOISE = 0.005
-"""Standard deviation of the noise, as a share of white: that of light itself at white where a pixel holds 40 000
-electrons, as the pixels of Levin's camera (Canon 1D) do at its lowest sensitivity. Darker pixels have less."""
+"""Standard deviation of the noise, as a share of white: the photon noise at white of a pixel of 40 000 electrons.
+
+The pixels of Levin's camera (Canon 1D) have this capacity at the lowest sensitivity. Darker pixels have less
+noise.
+"""
 LEAST_BLUR = 3.0
-"""Pixels: the blur of what is nearest to the focal plane. All else is blurred more, on one side of that plane."""
+"""Blur, pixels, of the object nearest to the focal plane. All others are blurred more, on the same side."""
 RIGHT = 1.0
-"""Pixels by which the blur may differ from the truth and count as right."""
+"""Largest error of a correct blur, pixels."""
 MARGIN = 1.0
-"""Pixels of blur by which the candidates reach beyond the scene, so that its ends are not given away."""
+"""Pixels of blur by which the candidates extend beyond the scene, so that they do not reveal its range."""
 TEXTURED = 1.5
-"""A block is textured where the energy of its gradients, under its window, is that many times the noise's, which
-itself fluctuates by a few per cent."""
+"""Ratio of gradient energy to noise, under the window of a block, from which the block counts as textured.
+
+The energy of the noise itself fluctuates by a few per cent.
+"""
 EXPONENT = 0.8
-"""Of gradients (Levin et al., section 2)."""
+"""Exponent of the gradient prior (Levin et al., section 2)."""
 LIGHT = {"code": float(LEVIN.mean()), "round": math.pi / 4, "square": 1.0}
-"""The share of the square around it that an opening lets through."""
+"""Transmission of an opening, relative to the square around it."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """How much work it is.
+    """Sizes that set the computing time.
 
     Args:
-        coarser: a pixel of the sensor is that many pixels of the built-in scene's views, so that these hold all it
-            can see.
-        step: from candidate to candidate, pixels of blur.
-        block_step: from block to block, pixels.
-        iterations: of the solver of the all-focus picture.
+        coarser: pixels of the built-in scene's views per pixel of the sensor, so that the views resolve what
+            it records.
+        step: between candidates, pixels of blur.
+        block_step: between blocks, pixels.
+        iterations: of the solver of the all-focus image.
     """
 
     coarser: float = 1.5
@@ -78,23 +83,23 @@ class Work:
 
 
 FULL = Work()
-"""As the page has it."""
+"""The sizes for the gallery's page."""
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """A light field and the camera before it.
+    """A light field and the camera for it.
 
     Args:
         field: at the entrance plane.
         focal_length: of the lens, metres.
-        focus: where it is focused, metres, on one side of the whole scene; may be negative (beyond infinity).
-        opening: width of the code and of the openings it is compared with, metres.
-        slope: what a pixel spans.
+        focus: distance in focus, metres, on one side of the whole scene; may be negative (beyond infinity).
+        opening: width of the code and of the other openings, metres.
+        slope: angular size of a pixel, as a slope.
         shape: rows and columns of the sensor.
-        candidates: distances that a block may have, metres, nearest first.
-        by_rays: whether pictures are made by rays, which fill in what few views leave out.
-        work: how much of it.
+        candidates: distances to choose from for each block, metres, nearest first.
+        by_rays: whether images are made by rays, which interpolate between few views.
+        work: sizes that set the computing time.
     """
 
     field: LightField
@@ -108,7 +113,7 @@ class Setup:
     work: Work = FULL
 
     def camera(self, opening: str) -> Camera:
-        """With the "code", or a "round" or "square" opening."""
+        """The camera with the "code", or a "round" or "square" opening."""
         distance = 1 / (1 / self.focal_length - 1 / self.focus)
         stop = {
             "code": Mask(LEVIN, width=self.opening),
@@ -120,15 +125,15 @@ class Setup:
 
     @property
     def block(self) -> int:
-        """Side of the blocks, pixels: `depth_from_defocus` wants twice the widest kernel or more."""
+        """Side of the blocks, pixels: `depth_from_defocus` requires at least twice the widest kernel."""
         return 8 * math.ceil(2 * float(self.blur(self.candidates).max()) / 8)
 
     def blur(self, distance: Any) -> Any:
-        """How wide a point is blurred, pixels: D·|1/Z − 1/F|/slope."""
+        """Width of the blur of a point, pixels: D·|1/Z − 1/F|/slope."""
         return self.opening * np.abs(1 / np.asarray(distance) - 1 / self.focus) / self.slope
 
     def recorded(self, opening: str, white: float | None = None) -> tuple[Array, float, float]:
-        """A recording as light lands, white 1, with noise; how much; and what radiance is white."""
+        """A noisy recording in the orientation of the sensor, white 1; its noise; the radiance of white."""
         camera = self.camera(opening)
         method: dict[str, Any] = {"method": "rays", "samples": 256} if self.by_rays else {"between_views": "none"}
         image = camera.capture(self.field, **method)
@@ -142,14 +147,14 @@ class Setup:
 
 
 def designed(bench: Bench, work: Work = FULL) -> Setup:
-    """Focused beyond the scene, or before it where there is no room, with candidates from near to far.
+    """Focused beyond the scene, or before it if there is no space, with candidates from near to far.
 
     Raises:
         InputError: a range of depths in which blurs hardly differ.
     """
     field, opening, slope = _seen(bench, work)
     near, far = 1 / bench.near, 1 / bench.far
-    unit = slope / opening  # of 1/Z, a pixel of blur
+    unit = slope / opening  # change of 1/Z per pixel of blur
     span = (near - far) / unit
     if span < 4 * work.step:
         raise InputError(
@@ -174,7 +179,7 @@ def designed(bench: Bench, work: Work = FULL) -> Setup:
 
 
 def _seen(bench: Bench, work: Work) -> tuple[LightField, float, float]:
-    """The light field to be seen, the width of the opening, metres, and what a pixel is to span."""
+    """The light field to record, the width of the opening, metres, and the slope per pixel of the sensor."""
     views, rows, columns = bench.light_field.shape[1], *bench.light_field.shape[2:4]
     slope = abs(float(bench.light_field.frame.linear[2, 2]))
     if bench.scene is None:
@@ -193,9 +198,9 @@ def _seen(bench: Bench, work: Work) -> tuple[LightField, float, float]:
 
 
 def _shape(field: LightField, opening: float, vergence: float, pixel: float) -> tuple[int, int]:
-    """How many pixels all views fill of a sensor that is focused on ``vergence``, 1/metres."""
+    """Rows and columns that all views cover on a sensor focused at ``vergence``, 1/metres."""
     linear = field.frame.linear
-    # Views that converge elsewhere than where the sensor looks leave its margins dark.
+    # If the views converge elsewhere than the sensor's focus, some views miss its margins.
     lost = opening / 2 * abs(float(linear[2, 0] / linear[0, 0]) - vergence) / pixel
     rows, columns = (int(n * abs(float(linear[2, 2])) / pixel - 2 * lost) for n in field.shape[2:4])
     return rows, columns
@@ -203,15 +208,15 @@ def _shape(field: LightField, opening: float, vergence: float, pixel: float) -> 
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What came of one aperture.
+    """The result for one aperture.
 
     Args:
-        recording: as light lands, (rows, columns, channels), white 1.
-        noise: of it.
+        recording: in the orientation of the sensor, (rows, columns, channels), white 1.
+        noise: its standard deviation.
         kernels: of the candidates.
-        alone: what each block says by itself.
+        alone: the estimate of each block independently.
         depth: the distances of blocks, smoothed.
-        textured: which blocks are.
+        textured: which blocks are textured.
     """
 
     recording: Array
@@ -223,7 +228,7 @@ class Found:
 
 
 def found_with(setup: Setup, opening: str, white: float | None) -> tuple[Found, float]:
-    """Record through an opening and look for the blur of each block; and what was white."""
+    """Record through an opening and estimate the blur of each block; also return the radiance of white."""
     recording, noise, white = setup.recorded(opening, white)
     kernels = defocus_kernels(setup.camera(opening), setup.candidates, aperture=setup.opening)
     alone = depth_from_defocus(
@@ -232,7 +237,7 @@ def found_with(setup: Setup, opening: str, white: float | None) -> tuple[Found, 
     grey = recording.mean(axis=2)
     across, down = np.diff(grey, axis=1)[:-1] ** 2, np.diff(grey, axis=0)[:, :-1] ** 2
     energy = in_blocks(np.pad(across + down, ((0, 1), (0, 1))), alone)
-    # A difference of two pixels has twice the variance of the noise, and there are two of them.
+    # The difference of two pixels has twice the variance of the noise, and the energy sums two differences.
     textured = energy > TEXTURED * 4 * noise**2 / recording.shape[2]
     return Found(recording, noise, kernels, alone, alone.smoothed(), textured), white
 
@@ -248,18 +253,18 @@ def in_blocks(picture: Array, depth: DefocusDepth) -> Array:
 
 
 def probability(setup: Setup, depth: DefocusDepth) -> Array:
-    """How probable it is that the blur found is right, for each block."""
+    """The probability that the estimated blur is correct, for each block."""
     share = np.exp(depth.log_likelihood)
     alike = np.abs(setup.blur(setup.candidates)[:, None, None] - setup.blur(depth.distance)) <= RIGHT
     return np.asarray((share * alike).sum(axis=0) / share.sum(axis=0))
 
 
 def all_in_focus(setup: Setup, found: Found) -> tuple[Array, int]:
-    """The recording restored for each distance by itself, blended by block; and for how many distances.
+    """The recording deblurred for each distance, blended by block; and the number of distances.
 
-    Blocks without texture stay as recorded, and distances that fewer blocks have than overlap one.
+    Blocks without texture stay as recorded. Distances with fewer blocks than overlap at a point are skipped.
     """
-    # Pictures half a pixel of blur apart look alike: every second candidate will do.
+    # Images that differ by half a pixel of blur look alike: every second candidate is enough.
     labels = np.minimum(found.depth.index // 2, (len(found.kernels) - 2) // 2) * 2 + 1
     picture, left, used = np.zeros_like(found.recording), np.ones(setup.shape), 0
     for label in np.unique(labels):
@@ -273,7 +278,7 @@ def all_in_focus(setup: Setup, found: Found) -> tuple[Array, int]:
 
 
 def _restored(setup: Setup, found: Found, label: int, share: Array) -> Array:
-    """Restored by one kernel; beside noise, what a blur that is off by a candidate changes stays unexplained."""
+    """The recording deblurred by one kernel; an error of one candidate in the blur counts as additional noise."""
     kernel = found.kernels[label]
     rough = wiener(found.recording, kernel, found.noise).picture
     apart = [blurred(rough, found.kernels[n]) for n in (label - 1, min(label + 1, len(found.kernels) - 1))]
@@ -285,12 +290,12 @@ def _restored(setup: Setup, found: Found, label: int, share: Array) -> Array:
 
 
 def at_pixels(blocks: Array, found: Found) -> Array:
-    """Values of blocks at each pixel, linear between their middles."""
+    """Values of blocks at each pixel, interpolated linearly between their middles."""
     wide = np.stack([np.interp(np.arange(found.recording.shape[1]), found.depth.columns, row) for row in blocks])
     rows = np.arange(found.recording.shape[0])
     return np.stack([np.interp(rows, found.depth.rows, column) for column in wide.T], axis=1)
 
 
 def is_right(setup: Setup, depth: DefocusDepth, known: Array) -> Flags:
-    """Which blocks have the blur of the distance that is known."""
+    """Which blocks have the blur of the known distance."""
     return np.asarray(np.abs(setup.blur(depth.distance) - setup.blur(known)) <= RIGHT)

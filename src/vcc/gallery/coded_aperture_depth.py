@@ -1,4 +1,4 @@
-"""Depth and an all-focus picture from one recording through a coded aperture (Levin et al. 2007)."""
+"""Depth and an all-focus image from one recording through a coded aperture (Levin et al. 2007)."""
 
 from __future__ import annotations
 
@@ -46,18 +46,18 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 INSIDE = 0.98
-"""Share of a block's window from which on it lies in one plane; others straddle a border of depth."""
+"""Least share of a block's window in one plane; blocks with less straddle a depth border."""
 
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is known of the scene, as light lands.
+    """The ground truth of the scene, in the orientation of the sensor.
 
     Args:
-        sharp: what a pinhole sees, (rows, columns, 3).
-        shares: of each pixel that shows a plane, (planes, rows, columns).
+        sharp: the image of a pinhole, (rows, columns, 3).
+        shares: the share of each plane in each pixel, (planes, rows, columns).
         distances: of the planes, metres.
-        depth: whose blocks are asked about.
+        depth: gives the positions of the blocks.
     """
 
     sharp: Array
@@ -67,7 +67,7 @@ class Truth:
 
     @classmethod
     def of(cls, bench: Bench, setup: Setup, depth: DefocusDepth) -> Truth:
-        """By the scene's closed form."""
+        """From the scene's closed form."""
         assert bench.scene is not None
         rows, columns = setup.shape
         s = (np.arange(columns) - (columns - 1) / 2)[None, :] * setup.slope
@@ -87,12 +87,12 @@ class Truth:
     @property
     @cached
     def in_plane(self) -> Array:
-        """The share of each block's window that shows a plane."""
+        """The share of each plane in each block's window."""
         return np.stack([in_blocks(share, self.depth) for share in self.shares])
 
     @property
     def known(self) -> Array:
-        """The distance of each block: of the plane that has the largest share."""
+        """The distance of each block: that of the plane with the largest share."""
         return np.asarray(self.distances[self.in_plane.argmax(axis=0)])
 
     @property
@@ -103,19 +103,19 @@ class Truth:
 
 @dataclass(frozen=True)
 class Run:
-    """Distances of blocks with the code and with plain openings, and the all-focus picture of the code's.
+    """Distances of blocks with the code and with plain openings, and the all-focus image of the code.
 
     Args:
-        work: how much of it.
+        work: sizes that set the computing time.
     """
 
     work: Work = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take a light field through the camera with each opening, and measure."""
+        """Record a light field through each opening, and measure."""
         setup = designed(bench, self.work)
         found: dict[str, Found] = {}
-        white = None if bench.scene is None else 1.0  # the truth's own
+        white = None if bench.scene is None else 1.0  # white of the truth
         openings = ("code", "round") if bench.scene is None else ("code", "round", "square")
         for done, opening in enumerate(openings):
             progress(done, len(openings) + 1)
@@ -167,7 +167,7 @@ def _pictures(
 
 
 def _against_truth(setup: Setup, found: dict[str, Found], truth: Truth) -> Iterator[Finding]:
-    """How many blocks are right, for each opening."""
+    """The share of correct blocks, for each opening."""
     whole, mixed = truth.whole, ~truth.whole
     code, plain, square = (
         {smoothed: _right(setup, each, truth, smoothed, whole) for smoothed in (False, True)}
@@ -207,13 +207,13 @@ def _against_truth(setup: Setup, found: dict[str, Found], truth: Truth) -> Itera
 
 
 def _right(setup: Setup, found: Found, truth: Truth, smoothed: bool, of: Flags) -> float:
-    """The share of textured blocks, among some, whose blur is right, in per cent."""
+    """The share of selected textured blocks with the correct blur, per cent."""
     depth = found.depth if smoothed else found.alone
     return 100 * _mean(is_right(setup, depth, truth.known), found.textured & of)
 
 
 def _probability_finding(setup: Setup, coded: Found, truth: Truth) -> Finding:
-    """How sure the decoder is, beside how right it is."""
+    """The decoder's own probability, compared with the share of correct blocks."""
     of = coded.textured & truth.whole
     right, sure = is_right(setup, coded.alone, truth.known), probability(setup, coded.alone)
     return Finding(
@@ -227,7 +227,7 @@ def _probability_finding(setup: Setup, coded: Found, truth: Truth) -> Finding:
 
 
 def _sharpness(setup: Setup, coded: Found, restored: Array, truth: Truth) -> Iterator[Finding]:
-    """How much sharper than the recording the all-focus picture is."""
+    """The gain in sharpness of the all-focus image over the recording."""
     margin = setup.block // 4
     inner = np.s_[margin:-margin, margin:-margin]
     right = at_pixels(is_right(setup, coded.depth, truth.known).astype(np.float64), coded) >= 0.5
@@ -254,7 +254,7 @@ def _mean(values: NDArray[Any], of: Flags) -> float:
 
 
 def _against_views(bench: Bench, setup: Setup, coded: Found) -> list[Finding]:
-    """How far the distances agree with those that the views' parallax tells; there is no truth."""
+    """Agreement of the distances with the parallax of the views, as there is no ground truth."""
     field = bench.light_field
     swept = depth_by_plane_sweep(field)
     row, column = field.shape[0] // 2, field.shape[1] // 2

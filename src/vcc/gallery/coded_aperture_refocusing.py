@@ -1,4 +1,4 @@
-"""Coded-aperture refocusing: a broadband mask in the aperture keeps what blur would lose (Veeraraghavan 2007)."""
+"""Coded-aperture refocusing: a broadband mask keeps detail that blur would lose (Veeraraghavan 2007)."""
 
 from __future__ import annotations
 
@@ -37,25 +37,25 @@ BLUR = 3 * CELLS
 NOISE = 0.002
 """Standard deviation of the additive noise of all recordings, as a share of white through the open aperture."""
 NOISES = (0.0005, 0.001, 0.002, 0.005, 0.01, 0.02)
-"""Those that gains are drawn for."""
+"""Noise levels for which gains are plotted."""
 FULL_WELL, READ_NOISE = 10_000.0, 2.5
-"""Electrons at white through the open aperture, and of reading a pixel: `vcc.optics.electronics`' defaults."""
+"""Electrons at white through the open aperture, and read noise: the defaults of `vcc.optics.electronics`."""
 CHART_PART = (-60e-3, -100e-3, 160e-3, 100e-3)
-"""A part of the built-in scene's chart that nothing stands before: left, top, right, bottom from its middle, m."""
+"""An unoccluded part of the built-in scene's chart: left, top, right, bottom from its middle, m."""
 LOST = 0.01
 """Contrast below which detail counts as lost, in a figure's title."""
 MISFIT = 0.05
-"""In the scene, what other distances add to a filter's noise: a share of the recording's contrast."""
+"""Error due to other distances in the scene, added to a filter's noise: a share of the recording's contrast."""
 SMALLEST_BLUR = 4.0
-"""Pixels; of the scene, for it to be shown."""
+"""Least blur of the scene, pixels, for it to be shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Deblurred:
-    """A recording and what filters make of it, in white.
+    """A recording and its deblurred versions; 1 is white.
 
     Args:
-        recording: divided by the light that passes.
+        recording: divided by the transmission.
         linear: by the Wiener filter.
         sparse: by the solver with sparse gradients.
     """
@@ -66,16 +66,16 @@ class Deblurred:
 
 
 Noise = Callable[[Array], tuple[Array, float]]
-"""Gives a recording its noise, and says how much that is in the mean, as shares of white."""
+"""Adds noise to a recording; also returns its mean standard deviation, as a share of white."""
 
 
 def additive(noise: float) -> Noise:
-    """Gaussian noise, the same for all that have as many pixels."""
+    """Gaussian noise, identical for all recordings with the same number of pixels."""
     return lambda recording: (recording + noise * np.random.default_rng(0).standard_normal(recording.shape), noise)
 
 
 def of_photons(recording: Array) -> tuple[Array, float]:
-    """The noise of photons and of reading."""
+    """Photon noise and read noise."""
     random = np.random.default_rng(0)
     charge = random.poisson(FULL_WELL * np.maximum(recording, 0)) + READ_NOISE * random.standard_normal(
         recording.shape
@@ -91,7 +91,7 @@ class Recordings:
         target: radiances, (rows, columns).
         masks: by name, "open" and "coded".
         clean: recordings; 1 is radiance 1 through the open aperture.
-        kernels: what becomes of a point.
+        kernels: images of a point.
     """
 
     target: Array
@@ -101,23 +101,23 @@ class Recordings:
 
     @classmethod
     def of(cls, target: Array) -> Recordings:
-        """Recorded through both."""
+        """Recordings through both apertures."""
         masks = {"open": Mask(Open(), width=OPENING), "coded": Mask(VEERARAGHAVAN, width=OPENING)}
         clean = {name: flat_target.recorded(mask, target, BLUR) for name, mask in masks.items()}
         return cls(target, masks, clean, {name: flat_target.kernel(mask, BLUR) for name, mask in masks.items()})
 
     def exposed(self, name: str, noise: Noise) -> tuple[Array, Array, float]:
-        """A recording with its noise, its kernel and how much noise that is, all over the light that passes."""
+        """A noisy recording, its kernel and the noise level, all divided by the transmission."""
         passed = float(self.kernels[name].sum())
         noisy, level = noise(self.clean[name])
         return noisy / passed, self.kernels[name] / passed, level / passed
 
     def gain(self, noise: Noise) -> float:
-        """The coded aperture's decibels by the Wiener filter over the open one's, by the filter or without."""
+        """Decibels of the coded aperture by the Wiener filter, minus the best of the open one, filtered or not."""
         return self._reached("coded", noise)[1] - max(self._reached("open", noise))
 
     def _reached(self, name: str, noise: Noise) -> tuple[float, float]:
-        """Decibels as recorded, and by the filter."""
+        """Decibels as recorded, and after the filter."""
         white, spread, level = self.exposed(name, noise)
         filtered = wiener(white, spread, level, borders="periodic").picture
         return psnr(white, self.target, peak=1.0), psnr(filtered, self.target, peak=1.0)
@@ -130,7 +130,7 @@ class Run:
     Args:
         target: largest side of the flat target, pixels.
         iterations: of the solver, at most.
-        noises: those that gains are drawn for.
+        noises: noise levels for which gains are plotted.
     """
 
     target: int = 300
@@ -138,7 +138,7 @@ class Run:
     noises: tuple[float, ...] = NOISES
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take the middle view, and then the light field, through both cameras, and measure."""
+        """Record the middle view, and then the light field, through both apertures, and measure."""
         recordings = Recordings.of(flat_target.grey_view(bench, self.target))
         steps = 2 * self.iterations + 20
         deblurred = {
@@ -167,7 +167,7 @@ class Run:
 
 
 def _after(progress: Progress, before: int, steps: int) -> Progress:
-    """A solver's progress among all steps."""
+    """A solver's progress as part of all steps."""
     return lambda done, total: progress(before + done, steps)
 
 
@@ -187,7 +187,7 @@ def _findings(deblurred: dict[str, Deblurred], target: Array) -> list[Finding]:
 
 
 def _gain_finding(what: str, ours: float, best: float, without: float) -> Finding:
-    """The mask's decibels over the best of the open aperture's, which has ``without`` as recorded."""
+    """The gain of the mask over the best result of the open aperture, which has ``without`` as recorded."""
     why = f"{ours:.1f} dB against {best:.1f} dB ({without:.1f} dB as recorded)"
     return Finding(what, "2 dB or more at the same noise", ours - best, "dB", ours - best >= 2, why)
 
@@ -258,12 +258,12 @@ def _pictures(
 
 @dataclass(frozen=True)
 class Refocusing:
-    """The light field, focused nearer, to be refocused on its middle distance.
+    """The light field, recorded with nearer focus, to be refocused at its middle distance.
 
     Args:
-        bench: whose light field it is.
-        blur: of what is at the middle distance, pixels.
-        focus: where the cameras are focused, metres.
+        bench: has the light field.
+        blur: of objects at the middle distance, pixels.
+        focus: distance on which the cameras are focused, metres.
     """
 
     bench: Bench
@@ -272,7 +272,7 @@ class Refocusing:
 
     @classmethod
     def of(cls, bench: Bench) -> Refocusing:
-        """Focused near, or less near: views that differ by more than a pixel hold no such blur."""
+        """Focused near, or less near: views that differ by more than a pixel cannot represent such a blur."""
         slope = abs(float(bench.light_field.frame.linear[2, 2]))
         most = min(bench.light_field.shape[:2])
         blur = min(APERTURE * (1 / bench.near - 1 / bench.middle) / slope, most)
@@ -280,11 +280,11 @@ class Refocusing:
 
     @property
     def shown(self) -> bool:
-        """Whether there is enough blur to take away."""
+        """Whether there is enough blur to remove."""
         return self.blur >= SMALLEST_BLUR
 
     def camera(self, mask: Mask, focus: float) -> Camera:
-        """Pixels of all these cameras see the same angles, so that their pictures lie pixel on pixel."""
+        """Pixels of all these cameras see the same angles, so that their images are aligned."""
         distance = self.bench.image_distance(focus)
         angles = [pitch / self.bench.image_distance(self.bench.middle) for pitch in self.bench.pitch]
         rows, columns = self.bench.light_field.shape[2:4]
@@ -302,12 +302,12 @@ class Refocusing:
         return Refocused(self, pictures, white, chart(sharp_camera))
 
     def _recorded(self, camera: Camera) -> Array:
-        """As light lands; 1 is radiance 1 through the whole square opening."""
+        """In the orientation of the sensor; 1 is radiance 1 through the whole square opening."""
         image = camera.capture(self.bench.light_field, interpolation="cubic")
         return image.to_numpy().astype(np.float64) * camera.sensor.z**2 / APERTURE**2
 
     def _restored(self, mask: Mask, white: float) -> tuple[Array, Array]:
-        """A recording with its noise over the light that passes, and refocused."""
+        """A noisy recording divided by the transmission, and refocused."""
         camera = self.camera(mask, self.focus)
         point = psf(camera, self.bench.middle)
         passed = point.collecting_area / APERTURE**2
@@ -318,13 +318,14 @@ class Refocusing:
 
 @dataclass(frozen=True, eq=False)
 class Refocused:
-    """What came of it.
+    """The result of refocusing.
 
     Args:
-        refocusing: of what.
-        pictures: "sharp", "open-recorded", "open", "coded-recorded" and "coded", as light lands.
+        refocusing: the input.
+        pictures: "sharp", "open-recorded", "open", "coded-recorded" and "coded", in the orientation of the
+            sensor.
         white: radiance.
-        chart: rows and columns of `CHART_PART`; only in the built-in scene is something there.
+        chart: rows and columns of `CHART_PART`; meaningful in the built-in scene only.
     """
 
     refocusing: Refocusing
@@ -334,7 +335,7 @@ class Refocused:
 
     @property
     def shown(self) -> dict[str, figures.Shown]:
-        """Upright."""
+        """Upright images for display."""
         return {name: figures.values_shown(each[::-1, ::-1], self.white) for name, each in self.pictures.items()}
 
 
@@ -363,7 +364,7 @@ def _scene_pictures(scene: Refocused) -> list[tuple[Picture, ...]]:
 
 
 def _scene_findings(scene: Refocused | None) -> list[Finding]:
-    """The gain where things are at a known distance; nobody knows where in someone's own scene that is."""
+    """The gain in a part of known distance, which only the built-in scene has."""
     if scene is None or scene.refocusing.bench.scene is None:
         return []
     sharp = scene.pictures["sharp"][scene.chart]
@@ -377,7 +378,7 @@ def _scene_findings(scene: Refocused | None) -> list[Finding]:
 
 
 def chart(camera: Camera) -> tuple[slice, slice]:
-    """Rows and columns, as light lands on the sensor, of `CHART_PART`."""
+    """Rows and columns, in the orientation of the sensor, of `CHART_PART`."""
     rows, columns = camera.sensor.shape
     sides = []
     for count, pitch, ends, middle in (
@@ -402,7 +403,7 @@ def _spectra_figure(masks: dict[str, Mask]) -> Figure:
         spread = psf(camera, flat_target.DISTANCE)
         side = (BLUR + 1) / 2
         axes = grid[2 * place]
-        wide = np.pad(spread.values[::-1, ::-1], BLUR)  # dark around it, cut to one pixel
+        wide = np.pad(spread.values[::-1, ::-1], BLUR)  # zero padding, cut to one pixel
         start = (wide.shape[0] - (BLUR + 2)) // 2
         part = wide[start : start + BLUR + 2, start : start + BLUR + 2]
         ends = (-side - 0.5, side + 0.5, side + 0.5, -side - 0.5)

@@ -1,4 +1,4 @@
-"""Coded exposure: a shutter that flutters by a code keeps what an open one loses of things that move.
+"""Coded exposure: a shutter that flutters by a code keeps detail of moving objects that an open shutter loses.
 
 Raskar et al. 2006. The target moves sideways by one pixel in each part of the code.
 """
@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CODE = "1010000111000001010000110011110111010111001001100111"
-"""The paper's, of 52 parts, of which half let light pass."""
+"""The paper's code, of 52 parts, half of them open."""
 CHOP = 1 * ms
-"""How long each part lasts."""
+"""Duration of each part, seconds."""
 PUPIL = 2 * mm
 DISTANCE = 2.0
-"""Of the target, metres, which is in focus."""
+"""Distance of the target, metres, which is in focus."""
 NOISE = 0.005
-"""Standard deviation, as a share of white of the shutter that stays open: that of the electronics."""
+"""Standard deviation of the electronics' noise, as a share of white with the open shutter."""
 TIME_TOLERANCE = 0.01
 MARGIN = 8
-"""Pixels of the target beyond those that the sensor sees at either end of the way."""
+"""Pixels of the target beyond the field of view, at either end of the motion."""
 LOST = 0.01
 """Share of contrast below which a frequency counts as lost."""
 LEAST_GAIN = 3.0
-"""dB."""
+"""Least gain, dB."""
 
 SHUTTERS = {"short": "1", "open": "1" * len(CODE), "coded": CODE}
 """Exposures by name: of one part, of all, and by the code."""
@@ -58,11 +58,11 @@ NAMES = {"short": "short exposure", "open": "shutter open", "coded": "shutter fl
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """What came of a shutter.
+    """The result for one shutter.
 
     Args:
         recorded: the target with noise, white 1, upright.
-        kernel: how light is spread along the way: of sum 1, found by a bright line that moves likewise.
+        kernel: the motion blur, of sum 1, measured with a bright line that moves likewise.
         restored: the target by a Wiener filter.
         decibels: its PSNR.
     """
@@ -74,16 +74,16 @@ class Taken:
 
     @property
     def contrast(self) -> Array:
-        """What is left of waves along the way, from 0 to half a cycle a pixel."""
+        """The modulation transfer along the motion, from 0 to half a cycle per pixel."""
         return np.asarray(np.abs(np.fft.rfft(self.kernel, 1024)))
 
 
 @dataclass(frozen=True)
 class Moving:
-    """A camera before a flat thing that moves sideways.
+    """A camera before a flat object that moves sideways.
 
     Args:
-        slope: what a pixel spans.
+        slope: angular size of a pixel, as a slope.
         focal_length: of the lens, metres.
     """
 
@@ -98,7 +98,7 @@ class Moving:
         return MovingCamera(still, shutter=coded(code, len(code) * CHOP))
 
     def scene(self, flat: Array) -> Callable[[float], LightField]:
-        """A flat thing that goes a pixel each `CHOP`: in the middle of a part of the code by whole pixels."""
+        """A flat object that moves by a pixel per `CHOP`, at whole pixels in the middle of each part."""
         views = np.ascontiguousarray(np.broadcast_to(flat.astype(np.float32), (2, 2, *flat.shape)))
         field = LightField.from_views(views, 2 * PUPIL, self.slope, DISTANCE, disparity_range=(0.0, 0.0))
 
@@ -109,7 +109,7 @@ class Moving:
         return at
 
     def photographed(self, flat: Array, code: str, shape: tuple[int, int]) -> Array:
-        """The thing through a shutter, upright; radiance 1 all the time that the shutter is open is 1."""
+        """The object through a shutter, upright; radiance 1 during the whole open time gives 1."""
         camera = self.camera(code, shape)
         start = (len(CODE) - len(code)) // 2 * CHOP
         image = camera.capture(
@@ -130,7 +130,7 @@ class Moving:
         return Taken(recorded, kernel, restored, psnr(restored, flat))
 
     def kernel(self, code: str) -> Array:
-        """What a bright upright line becomes along the way, of sum 1, with its middle in the middle."""
+        """The motion blur of a bright upright line, of sum 1, centred."""
         columns = len(CODE) + 2 * MARGIN + 1
         line = np.zeros((2 * MARGIN + 1, 2 * columns + 1))
         line[:, columns] = 1
@@ -140,7 +140,7 @@ class Moving:
 
 @dataclass(frozen=True)
 class Run:
-    """A target that moves, through a short exposure, an open shutter and one that flutters, each deblurred.
+    """A moving target through a short exposure, an open shutter and a coded one, each deblurred.
 
     Args:
         target: its largest side, pixels.
@@ -149,7 +149,7 @@ class Run:
     target: int = 240
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take the middle view of a light field as a target, and measure."""
+        """Use the middle view of a light field as a target, and measure."""
         advance = Steps(progress, len(SHUTTERS))
         progress(0, advance.total)
         flat = flat_target.grey_view(bench, self.target)
@@ -220,7 +220,7 @@ def _contrast_figure(found: dict[str, Taken]) -> Figure:
 
 
 def _findings(found: dict[str, Taken]) -> tuple[Finding, ...]:
-    # Relative to a short exposure: what sampling and a pixel's way take from all three alike is left out.
+    # Relative to a short exposure, to exclude the losses by sampling and by the motion within a part.
     lowest = {name: float((found[name].contrast / found["short"].contrast).min()) for name in ("coded", "open")}
     over_open = found["coded"].decibels - found["open"].decibels
     over_short = found["coded"].decibels - found["short"].decibels

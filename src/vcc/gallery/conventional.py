@@ -26,7 +26,7 @@ POINT_PITCH = 4 * um
 
 
 def run(bench: Bench, progress: Progress) -> Result:
-    """Pictures focused on three distances, phase space on the way, and the blur of points by closed form."""
+    """Images at three focus distances, phase space at each stage, and the blur of points against theory."""
     exposure = bench.exposure(bench.conventional(bench.middle), bench.diameter)
     taken, pictures = {}, []
     for done, (name, distance) in enumerate(bench.distances.items()):
@@ -54,10 +54,10 @@ def run(bench: Bench, progress: Progress) -> Result:
 
 
 def _in_focus(bench: Bench, taken: list[figures.Shown]) -> list[Finding]:
-    """For how many things the picture focused on them is the sharpest."""
+    """The number of objects for which the image focused on them is the sharpest."""
     if bench.scene is None:
-        return []  # nobody knows where in someone's own scene things are at which distance
-    size = max(min(bench.light_field.shape[2:4]) // 20, 8)  # small enough to lie on a leaf
+        return []  # the distances of objects are unknown in light fields of the user
+    size = max(min(bench.light_field.shape[2:4]) // 20, 8)  # small enough to fit on a leaf
     right = 0
     places = (CHECK_PLACES["leaf"], PLACES["the chart's star"], PLACES["lamps of the town"])
     for number, place in enumerate(places):
@@ -69,7 +69,7 @@ def _in_focus(bench: Bench, taken: list[figures.Shown]) -> list[Finding]:
 
 
 def _blurs(bench: Bench) -> list[Finding]:
-    """The spread of the picture of a point, focused in the middle, beside D·d·|1/Z − 1/F|/4 of geometry."""
+    """The width of the image of a point, focused in the middle, against D·d·|1/Z − 1/F|/4 of geometry."""
     found = []
     distance_to_sensor = bench.image_distance(bench.middle)
     for name in ("near", "far"):
@@ -79,12 +79,12 @@ def _blurs(bench: Bench) -> list[Finding]:
         pixels = 2 * math.ceil(2.3 * expected / POINT_PITCH) + 9
         camera = Camera([bench.lens], Sensor(distance_to_sensor, (pixels, pixels), POINT_PITCH))
         with warnings.catch_warnings():
-            # All that the light field holds is the point: the sensor looks past it, as it should.
+            # The light field contains only the point: most of the sensor lies outside it, as intended.
             warnings.simplefilter("ignore", ResultWarning)
             image = camera.capture(_point(distance, bench.diameter), between_views="none").to_numpy()
         x = camera.sensor.column_places
         across = image.sum(axis=0, dtype=np.float64)
-        # A pixel and the point's own width add their variances.
+        # The variances of a pixel and of the point's own width add.
         extra = POINT_PITCH**2 / 12 + POINT_PITCH**2 / 6
         spread = math.sqrt(max(float(across @ x**2 / across.sum()) - extra, 0.0))
         found.append(
@@ -100,7 +100,7 @@ def _blurs(bench: Bench) -> list[Finding]:
 
 
 def _point(distance: float, width: float) -> LightField:
-    """A point of light on the axis: one pixel a view, all of which look at it."""
+    """A point of light on the axis: one pixel per view, and all views converge on it."""
     spacing = width / POINT_VIEWS
     values = np.ones((POINT_VIEWS, POINT_VIEWS, 1, 1), np.float32)
     middle = (POINT_VIEWS - 1) / 2

@@ -29,24 +29,26 @@ Array = NDArray[np.float64]
 RINGS = 96
 """Rings of the plates, of equal area."""
 MARGIN = 1.5
-"""How much further than the range of depths the plates reach, so that its ends are like its middle."""
+"""How much further than the range of depths the plates reach, so that its ends behave like its middle."""
 SEED = 2007
 FREQUENCY = 0.1
-"""Cycles per pixel at which contrast is compared."""
+"""Frequency at which contrast is compared, cycles per pixel."""
 LEAST_GAIN = 5.0
-"""dB: what wavefront coding is asked for, asked here too."""
+"""Least gain, dB: the same as for wavefront coding."""
 
 
 @dataclass(frozen=True)
 class RandomRings(Surface):
-    """A round surface of rings of equal area, each of which bends light along the radius by a random amount.
+    """A round surface of rings of equal area, each with a random radial deflection.
 
     Args:
         radius: of the surface, metres.
-        strongest: the largest deflection at the rim, as a slope: ring n has gₙ evenly spread over ±strongest.
-        power: of r/radius by which the deflection grows: 1 makes rings of lenses, each of its own focal length
-            (García-Guerrero et al. 2007); 0 makes wedges that scatter as far everywhere (Cossairt et al. 2010).
-        rings: how many.
+        strongest: the largest deflection at the rim, as a slope: the gₙ of the rings are evenly spread over
+            ±strongest.
+        power: exponent of r/radius in the deflection: 1 makes rings of lenses, each of its own focal length
+            (García-Guerrero et al. 2007); 0 makes wedges that scatter equally everywhere (Cossairt et al.
+            2010).
+        rings: their number.
         seed: of their order.
     """
 
@@ -59,7 +61,7 @@ class RandomRings(Surface):
     @property
     @cached
     def amounts(self) -> Array:
-        """Of the rings from the middle outwards, evenly spread over ±1 and in random order."""
+        """Factors of the rings from the middle outwards, evenly spread over ±1 and in random order."""
         even = (np.arange(self.rings) + 0.5) / self.rings * 2 - 1
         return np.random.default_rng(self.seed).permutation(even)
 
@@ -82,7 +84,7 @@ class RandomRings(Surface):
         return bent * x / away, bent * y / away
 
     def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
-        """The strongest ring's, at the rim or at the corner of the rectangle."""
+        """The deflection of the strongest ring, at the rim or at the corner of the rectangle."""
         far = max(np.hypot(half_width, half_height) / self.radius, 1.0) ** self.power
         return self.strongest * far, self.strongest * far
 
@@ -95,7 +97,7 @@ class Kinds:
     """The lens without a diffuser and with each kind.
 
     Args:
-        comparison: over which depths.
+        comparison: the range of depths.
         strongest: deflection of the diffusers at the rim, as a slope.
         plain: elements without a diffuser.
         random: with the random-phase one.
@@ -110,10 +112,10 @@ class Kinds:
 
 
 def designed(bench: Bench, sizes: Sizes = FULL) -> Kinds:
-    """Diffusers that bend by `MARGIN` times what defocus does at the rim.
+    """Diffusers that deflect by `MARGIN` times the defocus at the rim.
 
     Raises:
-        InputError: a range of depths so small that nothing is out of focus.
+        InputError: a range of depths too small for any defocus.
     """
     comparison = Comparison(bench, round=True, sizes=sizes)
     lens = Lens(bench.focal_length)
@@ -129,13 +131,13 @@ class Run:
     """PSFs over depth without and with both diffusers, a flat target restored by one filter, and the scene.
 
     Args:
-        sizes: how much work it is.
+        sizes: sizes that set the computing time.
     """
 
     sizes: Sizes = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take a light field through the three cameras, and measure."""
+        """Record a light field with the three cameras, and measure."""
         kinds = designed(bench, self.sizes)
         comparison, depths = kinds.comparison, kinds.comparison.depths
         advance = Steps(progress, 3 * len(depths) + 2)

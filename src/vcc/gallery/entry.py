@@ -1,4 +1,4 @@
-"""What every camera of the gallery has: a citation, a claim, and a run that measures it."""
+"""The common parts of gallery entries: a citation, a claim, and a run that measures it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Steps:
-    """Counts steps and tells how far the work is: called after each.
+    """Counts steps and reports progress: called after each step.
 
     Args:
-        progress: whom to tell.
-        total: how many steps there are.
-        done: how many are done.
+        progress: receives the counts.
+        total: number of steps.
+        done: number of completed steps.
     """
 
     progress: Progress
@@ -34,7 +34,7 @@ class Steps:
     done: int = 0
 
     def __call__(self) -> None:
-        """One more is done."""
+        """Count one more step."""
         self.done += 1
         self.progress(self.done, self.total)
 
@@ -47,7 +47,7 @@ class Picture:
         name: of the file, without its ending.
         title: a few words.
         caption: HTML.
-        content: what is drawn: (rows, columns, 3) as screens want it, 0 to 1, or a figure of matplotlib.
+        content: (rows, columns, 3) for display, 0 to 1, or a Matplotlib figure.
     """
 
     name: str
@@ -58,15 +58,15 @@ class Picture:
 
 @dataclass(frozen=True)
 class Finding:
-    """One number that a run measured, beside what was claimed.
+    """One measured number, with the claim about it.
 
     Args:
-        what: was measured, in words.
-        claim: what is published or follows from it in closed form, in words; empty where nothing is claimed.
-        value: what this run measured.
+        what: name of the measurement.
+        claim: the published value or a closed-form result, as text; empty without a claim.
+        value: the measured value.
         unit: of the value, e.g. ``"dB"``; empty for a plain number.
-        reached: whether the claim was reached; None where nothing is claimed.
-        why: what explains the number, above all where the claim was not reached.
+        reached: whether the claim was reached; None without a claim.
+        why: an explanation, especially if the claim was not reached.
     """
 
     what: str
@@ -78,24 +78,24 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """Whether the claim was reached, in words; a dash where nothing is claimed."""
+        """Whether the claim was reached, as text; a dash without a claim."""
         return {True: "reached", False: "not reached", None: "–"}[self.reached]
 
     @property
     def measured(self) -> str:
-        """The value with its unit, as people read it."""
+        """The value with its unit, as readable text."""
         return f"{self.value:.3g} {self.unit}".strip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Result(showing.Shown, Brief):
-    """What came of a run.
+    """The result of a run.
 
     Args:
         text: HTML paragraphs: the optics with the parameters used, and how the recording was decoded.
         pictures: rows of pictures.
-        numbers: what was measured.
-        assumed: what had to be assumed about the light field, a sentence; empty if nothing.
+        numbers: the measurements.
+        assumed: a sentence on the assumptions about the light field; empty if there are none.
     """
 
     text: str
@@ -114,12 +114,12 @@ class Entry:
     """A published camera.
 
     Args:
-        name: by which it is asked for.
-        title: in words.
-        citation: who published it, and where.
-        claim: what they say it does, in a sentence.
-        runner: takes a bench through the camera, see `run`; where that is much work, a dataclass whose fields say
-            how much.
+        name: identifier.
+        title: as text.
+        citation: authors and publication.
+        claim: of the authors, in a sentence.
+        runner: runs the camera on a bench, see `run`; if that is much work, a dataclass whose fields set the
+            sizes.
     """
 
     name: str
@@ -129,12 +129,13 @@ class Entry:
     runner: Callable[[Bench, Progress], Result] = field(repr=False)
 
     def run(self, light_field: Path | LightField | None = None, progress: Progress | None = None) -> Result:
-        """Take a light field through the camera and its decoder, and measure.
+        """Record a light field with the camera, decode it, and measure.
 
         Args:
-            light_field: a light field, or a folder, file or store that holds one; its world is scaled so that its
-                grid of views is 20 mm wide (`vcc.showcase.bench.from_someone`). None takes the built-in scene:
-                leaves at 0.8 m, a chart at 1.3 m and a town at 3 m, 20×20 views of 500×500 pixels.
+            light_field: a light field, or a folder, file or store that contains one; its lengths are scaled
+                so that its grid of views is 20 mm wide (`vcc.showcase.bench.from_someone`). None uses the
+                built-in scene: leaves at 0.8 m, a chart at 1.3 m and a town at 3 m, 20×20 views of 500×500
+                pixels.
             progress: called with (done, total) as the work advances.
 
         Raises:
@@ -144,7 +145,7 @@ class Entry:
 
 
 def bench_for(light_field: Path | LightField | None) -> Bench:
-    """The light field before a lens, and the distances to focus on; the built-in scene if None is given."""
+    """The light field before a lens, and the distances to focus on; the built-in scene for None."""
     return _scene() if light_field is None else from_someone(light_field, small=False)
 
 
@@ -154,4 +155,4 @@ def _scene() -> Bench:
 
 
 def silent(done: int, total: int) -> None:
-    """Progress that nobody is told of."""
+    """A progress callback that does nothing."""

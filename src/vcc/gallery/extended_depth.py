@@ -1,7 +1,7 @@
-"""What cameras that make the blur alike at all depths are measured by: PSFs, a flat target and the scene.
+"""Measurements of cameras with depth-invariant blur: PSFs, a flat target and the scene.
 
-Each is compared with the same lens without its element: how alike its PSFs are over a range of depths, what one
-filter for all depths restores, and what that costs in focus.
+Each camera is compared with the same lens without its element: similarity of the PSFs over a range of depths,
+restoration by one filter for all depths, and the cost in focus.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ PUPIL = 10 * mm
 """Width of the opening."""
 WAVELENGTH = 550 * nm
 LEAST_MISFOCUS = 20 / 3
-"""ψ in radians at the ends of the range below which there is no depth of field to extend."""
+"""Least ψ, radians, at the ends of the range; below, there is no depth of field to extend."""
 NOISE = 0.005
 """Standard deviation of the noise of all recordings, as a share of white."""
 BORDER = 0.14
-"""Share of the flat target at each side that decibels leave out: filters know too little there."""
+"""Share of the flat target at each side that decibels exclude, because filters lack data there."""
 ALIKE = 0.95
-"""Correlation from which on PSFs count as alike."""
+"""Least correlation of PSFs that count as alike."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much work a comparison is.
+    """Sizes that set the computing time of a comparison.
 
     Args:
-        depths: at how many of them.
+        depths: their number.
         target: largest side of the flat target, pixels.
-        rays: across the opening, of which a point-spread function is made.
-        samples: rays for each pixel of a recording: of fewer the sampling, not the noise, would limit what filters
-            restore.
+        rays: across the opening, for a point-spread function.
+        samples: rays per pixel of a recording; with fewer, the sampling error, not the noise, would limit the
+            restoration.
     """
 
     depths: int = 7
@@ -67,17 +67,17 @@ class Sizes:
 
 
 FULL = Sizes()
-"""As the pages have it."""
+"""The sizes for the gallery's pages."""
 
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What came of a camera.
+    """The result for one camera.
 
     Args:
         spreads: its PSF at each depth, upright, of sum 1, (depths, rows, columns).
         restored: the flat target at each depth, (rows, columns).
-        decibels: PSNR of these.
+        decibels: PSNR of the restored targets.
     """
 
     spreads: Array
@@ -96,9 +96,9 @@ class Comparison:
     """Cameras compared over a range of depths; all are focused in its middle, in 1/Z.
 
     Args:
-        bench: whose light field they see, and whose middle view is the flat target.
-        round: whether their opening is a disc, of the diameter `PUPIL`, or else a square.
-        sizes: how much work it is.
+        bench: has the light field, whose middle view is the flat target.
+        round: whether the opening is a disc of diameter `PUPIL`; otherwise it is a square.
+        sizes: sizes that set the computing time.
     """
 
     bench: Bench
@@ -114,7 +114,7 @@ class Comparison:
 
     @property
     def focus(self) -> float:
-        """Where they are focused, metres."""
+        """The distance in focus, metres."""
         return 2 / (1 / self.bench.near + 1 / self.bench.far)
 
     @property
@@ -135,19 +135,19 @@ class Comparison:
 
     @property
     def slope(self) -> float:
-        """What a pixel spans, as a slope."""
+        """Angular size of a pixel, as a slope."""
         return abs(float(self.bench.light_field.frame.linear[2, 2]))
 
     def sensor(self, shape: tuple[int, int]) -> Sensor:
-        """A sensor in focus, its pixels those of the views."""
+        """A sensor in focus, with pixels that match those of the views."""
         distance = self.bench.image_distance(self.focus)
         return Sensor(distance, shape, self.slope * distance)
 
     def spreads(self, elements: Elements) -> Array:
-        """The PSFs of points on the axis at all depths, on the sensor's pixels: rays traced and counted.
+        """The PSFs of points on the axis at all depths, on the sensor's pixels: histograms of traced rays.
 
         Returns:
-            (depths, rows, columns), upright as pictures are, each of sum 1.
+            (depths, rows, columns), upright, each of sum 1.
         """
         sensor = self.sensor((1, 1))
         places = ((np.arange(self.sizes.rays) + 0.5) / self.sizes.rays - 0.5) * PUPIL
@@ -171,14 +171,14 @@ class Comparison:
         return flat_target.grey_view(self.bench, self.sizes.target)
 
     def recorded(self, elements: Elements, depth: float, noise: float = NOISE) -> tuple[Array, float]:
-        """The flat target at a depth, through a camera; upright, white 1, with noise; and how much of it.
+        """The flat target at a depth, through a camera; upright, white 1, with noise; and the noise level.
 
-        Beyond its border it goes on mirrored, so that the border of the recording holds no dark.
+        The target is mirrored beyond its border, so that the recording has no dark border.
         """
         flat = self.target()
         margin = min(64, *(side - 1 for side in flat.shape))
         wide = np.pad(flat, margin, mode="symmetric").astype(np.float32)
-        # All views of a flat thing are the same picture where they converge on it.
+        # For a flat object, all views are the same picture if they converge on it.
         views = np.ascontiguousarray(np.broadcast_to(wide, (2, 2, *wide.shape)))
         field = LightField.from_views(views, PUPIL, self.slope, depth, disparity_range=(0.0, 0.0))
         return self.photographed(elements, field, (flat.shape[0], flat.shape[1]), noise)
@@ -186,7 +186,7 @@ class Comparison:
     def photographed(
         self, elements: Elements, field: LightField, shape: tuple[int, int], noise: float = NOISE
     ) -> tuple[Array, float]:
-        """A light field through a camera, upright, with noise; and how much, that of the rays with it.
+        """A light field through a camera, upright, with noise; and the noise level, including that of the rays.
 
         Radiance 1 through the whole opening is 1.
         """
@@ -202,8 +202,8 @@ class Comparison:
 
         Args:
             elements: of the camera.
-            plain: of the one without an element, whose picture in focus without noise is the truth. If that is the
-                camera itself, a recording stays as it is where no filter is better.
+            plain: elements of the reference; its noiseless image in focus is the truth. If it is the camera
+                itself, the recording is kept if it is better than the filtered one.
             advance: called after each depth.
         """
         sharp, _ = self.recorded(plain, self.focus, noise=0)
@@ -212,13 +212,13 @@ class Comparison:
     def restored(
         self, elements: Elements, sharp: Array, advance: Callable[[], None], or_as_recorded: bool = False
     ) -> Measured:
-        """The same, beside a true picture.
+        """The same with a given truth.
 
         Args:
             elements: of the camera.
             sharp: the truth.
             advance: called after each depth.
-            or_as_recorded: whether a recording stays as it is where no filter is better.
+            or_as_recorded: whether the recording is kept if it is better than the filtered one.
         """
         spreads = self.spreads(elements)
         restored, decibels = [], []
@@ -246,10 +246,10 @@ def inner(picture: Array, border: float, whole: Callable[[float], int] = round) 
 
 
 def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
-    """PSFs side by side over depth, a row a camera.
+    """PSFs side by side over depth, a row per camera.
 
     Args:
-        found: by the words that stand beside the row.
+        found: by the label of the row.
         depths: metres.
     """
     side = min(max(each.spreads.shape[1] for each in found.values()), 61)
@@ -267,14 +267,14 @@ def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fi
 
 
 def _middle(picture: Array, side: int) -> figures.Shown:
-    """So many pixels of the middle, with dark around it where there are fewer; both sides are odd."""
+    """The middle square of a PSF, padded with zeros if it is too small; both sides are odd."""
     wide = np.pad(picture, max((side - len(picture)) // 2, 0)).astype(np.float32)
     cut = (len(wide) - side) // 2
     return wide[cut : cut + side, cut : cut + side]
 
 
 def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
-    """The flat target restored near, in focus and far, a row a camera."""
+    """The flat target restored near, in focus and far, a row per camera."""
     figure = figures.new_figure(9.0, 3.2 * len(found))
     rows = [
         [
@@ -292,12 +292,12 @@ def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fig
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A camera that takes the scene.
+    """A camera that records the scene.
 
     Args:
         name: of the pictures' files.
-        words: above them.
-        comparison: by which they are taken.
+        words: title.
+        comparison: its settings.
         elements: of the camera.
     """
 
@@ -308,7 +308,7 @@ class Seen:
 
 
 def scene_pictures(plain: Seen, coded: Seen, spreads: Array, advance: Callable[[], None]) -> tuple[Picture, ...]:
-    """The light field itself through both cameras, and the coded recording restored by the one filter.
+    """The light field through both cameras, and the coded recording restored by the one filter.
 
     Args:
         plain: the camera without an element.

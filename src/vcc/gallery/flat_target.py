@@ -1,8 +1,8 @@
-"""A flat target out of focus, as cameras with codes in their apertures record it.
+"""A flat target out of focus, recorded through coded apertures.
 
-The target is a grid of points of light, one for each pixel, and repeats beyond its borders, so that no border
-plays a part: recording it is a convolution with one kernel, the camera's picture of a single point. Where a code's
-cells are whole pixels wide, that kernel is the code itself, as papers on apertures take it.
+The target is a grid of points of light, one per pixel, and repeats periodically, which avoids border effects.
+Recording it is a convolution with one kernel, the camera's image of a single point. If a code's cells are
+whole pixels wide, the kernel is the code itself, as papers on apertures assume.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ FOCAL_LENGTH = 50 * mm
 OPENING = 20 * mm
 """Width of the apertures' square."""
 FOCUS, DISTANCE = 0.8, 2.0
-"""What the camera is focused on, and where the target stands, metres."""
+"""Distance in focus, and distance of the target, metres."""
 VIEWS_PER_PIXEL = 4
-"""Of the blur, a side: of how many rays a pixel's light is made."""
+"""Views per pixel of blur, along a side: sets the number of rays per pixel."""
 SMALLEST = 64
-"""Side of a target, pixels."""
+"""Least side of a target, pixels."""
 
 
 def grey_view(bench: Bench, most: int) -> Array:
     """The middle of the middle view as a target: grey, 0 to 1, shape (rows, columns) of ``most`` or less.
 
     Raises:
-        InputError: views that are smaller than a target must be, or dark.
+        InputError: views that are too small for a target, or dark.
     """
     nv, nu, nt, ns = bench.light_field.shape[:4]
     if min(nt, ns) < SMALLEST:
@@ -55,7 +55,7 @@ def grey_view(bench: Bench, most: int) -> Array:
 
 
 def focal_camera(mask: Mask, shape: tuple[int, int], blur: int, focus: float = FOCUS) -> Camera:
-    """A lens with a mask in it, whose opening is ``blur`` pixels wide in the picture of a point of the target."""
+    """A lens with a mask in it; the opening is ``blur`` pixels wide in the image of a point of the target."""
     distance = 1 / (1 / FOCAL_LENGTH - 1 / focus)
     return Camera([Lens(FOCAL_LENGTH), mask], Sensor(distance, shape, _slope(blur) * distance))
 
@@ -69,14 +69,14 @@ def recorded(mask: Mask, target: Array, blur: int) -> Array:
         blur: pixels across the opening.
 
     Returns:
-        Upright, shape of the target; 1 is radiance 1 through all of the square opening.
+        Upright, shape of the target; 1 is radiance 1 through the whole square opening.
     """
     around = [(blur, blur), (blur, blur)]
     return _through(mask, np.pad(target, around, mode="wrap"), target.shape, blur)
 
 
 def kernel(mask: Mask, blur: int) -> Array:
-    """The picture of one point of the target, upright, of an odd side; its sum is the share of light passed."""
+    """The image of one point of the target, upright, of an odd side; its sum is the transmission."""
     side = blur + 5 - blur % 2
     dot = np.zeros((side + 2 * blur, side + 2 * blur))
     dot[dot.shape[0] // 2, dot.shape[1] // 2] = 1
@@ -85,15 +85,15 @@ def kernel(mask: Mask, blur: int) -> Array:
 
 def _through(mask: Mask, wide: Array, shape: tuple[int, ...], blur: int) -> Array:
     views = VIEWS_PER_PIXEL * blur
-    # All views of a flat thing are the same picture where they converge on it: no copies are made.
+    # For a flat object, all views are the same picture if they converge on it: broadcast, without copies.
     values = np.broadcast_to(wide.astype(np.float32), (views, views, *wide.shape))
     field = LightField.from_views(values, OPENING / views, _slope(blur), DISTANCE, disparity_range=(0.0, 0.0))
     camera = focal_camera(mask, (shape[0], shape[1]), blur)
-    # A point's ray brings all of its light to the pixel that it lands in.
+    # With "nearest", each ray of a point contributes all of its light to one pixel.
     image = camera.capture(field, method="footprints", between_views="none", interpolation="nearest")
     return np.asarray(image.upright().to_numpy(), dtype=np.float64) * camera.sensor.z**2 / OPENING**2
 
 
 def _slope(blur: int) -> float:
-    """Of a pixel: the opening's shadow is OPENING·d·|1/FOCUS − 1/DISTANCE| wide, at d behind the lens."""
+    """Slope per pixel: the opening's blur is OPENING·d·|1/FOCUS − 1/DISTANCE| wide, at d behind the lens."""
     return OPENING * abs(1 / FOCUS - 1 / DISTANCE) / blur

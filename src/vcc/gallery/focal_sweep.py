@@ -1,4 +1,4 @@
-"""Focal sweep: a sensor that moves through focus blurs all depths alike (Kuthirummal et al. 2011)."""
+"""Focal sweep: a sensor that moves through focus makes the blur depth-invariant (Kuthirummal et al. 2011)."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from vcc.showcase.words import away, paragraphs
 Array = NDArray[np.float64]
 
 FULL = Sizes(depths=5, target=200, samples=256)
-"""As the page has it."""
+"""The sizes for the gallery's page."""
 MARGIN = 1.5
-"""How much further the sensor goes than the images of the depths, so that the ends are like the middle."""
+"""Travel of the sensor relative to the range of the images, so that its ends behave like its middle."""
 EXPOSURE = 0.36
 """Seconds, as in the paper's first example."""
 STEPS = 61
-"""Places of the sensor of which a point-spread function is made."""
+"""Positions of the sensor for a point-spread function."""
 TIME_TOLERANCE = 0.03
-"""Error of a picture's mean over time, of its mean, rays included; how far rays are off is measured besides."""
+"""Error of the mean over time, relative to the image's mean, rays included; the error of rays is also measured."""
 FEWER = 8
-"""Rays for each moment are so many times fewer than for a camera that stands still, as moments are many."""
+"""Factor by which each moment has fewer rays than a static camera, because there are many moments."""
 LEAST_GAIN = 3.0
-"""dB, where the lens alone is out of focus."""
+"""Least gain, dB, where the lens alone is out of focus."""
 
 
 @dataclass(frozen=True)
 class Sweeping(Comparison):
-    """A lens with its stop in the front focal plane, so that pictures stay as large wherever the sensor goes.
+    """A lens with its stop in the front focal plane: the image size is independent of the sensor's position.
 
     Args:
-        travel: by which the sensor moves, metres; 0 stands still.
-        place: of the middle of its way from where it is in focus, metres.
+        travel: of the sensor, metres; 0 for a static one.
+        place: the middle of the travel, relative to the position in focus, metres.
     """
 
     travel: float = 0.0
@@ -58,16 +58,16 @@ class Sweeping(Comparison):
         return Mask(Circle(PUPIL)), Lens(f, z=f)
 
     def image_at(self, depth: float) -> float:
-        """Where a depth before the stop is in focus, metres: f·f/Z behind the focal plane, by Newton."""
+        """Position of the image of a depth before the stop, metres: f·f/Z behind the focal plane, by Newton."""
         f = self.bench.focal_length
         return 2 * f + f * f / depth
 
     def sensor(self, shape: tuple[int, int]) -> Sensor:
-        """The sensor in the middle of its way, its pixels those of the views."""
+        """The sensor in the middle of its travel, with pixels that match those of the views."""
         return Sensor(self.image_at(self.focus) + self.place, shape, self.slope * self.bench.focal_length)
 
     def spreads(self, elements: Elements) -> Array:
-        """The PSFs of points on the axis at all depths, means over the sensor's places."""
+        """The PSFs of points on the axis at all depths, averaged over the sensor's positions."""
         if self.travel == 0:
             return super().spreads(elements)
         places = ((np.arange(STEPS) + 0.5) / STEPS - 0.5) * self.travel
@@ -79,10 +79,10 @@ class Sweeping(Comparison):
     def photographed(
         self, elements: Elements, field: LightField, shape: tuple[int, int], noise: float = NOISE
     ) -> tuple[Array, float]:
-        """A light field through the camera, upright, with noise; and how much, that of the rays with it."""
+        """A light field through the camera, upright, with noise; and the noise level with that of the rays."""
         samples = self.sizes.samples if self.travel == 0 else max(4, self.sizes.samples // FEWER)
         camera = self.moving(elements, shape)
-        # By different rays: they tell how far rays are off
+        # Two runs with different rays: their difference measures the error of the rays.
         one, other = (
             camera.capture(
                 field, EXPOSURE, time_tolerance=TIME_TOLERANCE, method="rays", samples=samples // 2, seed=seed
@@ -90,7 +90,7 @@ class Sweeping(Comparison):
             .upright()
             .to_numpy()
             .astype(np.float64)
-            # The same cone of light wherever the sensor is
+            # The cone of light is the same at all positions of the sensor.
             * (self.bench.focal_length**2 / (math.pi / 4 * PUPIL**2))
             for seed in (0, 10_000)
         )
@@ -98,7 +98,7 @@ class Sweeping(Comparison):
         return noisy, math.hypot(noise, math.sqrt(float(np.mean((one - other) ** 2))) / 2)
 
     def moving(self, elements: Elements, shape: tuple[int, int]) -> MovingCamera:
-        """The camera and the way of its sensor, at a constant speed."""
+        """The camera with a sensor that moves at constant speed."""
         sensor = self.sensor(shape)
         ends = [sensor.z - self.travel / 2, sensor.z + self.travel / 2]
         courses = {"sensor.z": Lines([0, EXPOSURE], ends)} if self.travel else {}
@@ -107,22 +107,22 @@ class Sweeping(Comparison):
 
 @dataclass(frozen=True)
 class Run:
-    """Point-spread functions over depth, a flat target restored by one filter at each depth, and the scene.
+    """Point-spread functions over depth, a flat target restored by one filter for all depths, and the scene.
 
     Args:
-        sizes: how much work it is.
+        sizes: sizes that set the computing time.
     """
 
     sizes: Sizes = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take a light field through the camera at rest and through the one that sweeps, and measure."""
+        """Record a light field with the static and the sweeping camera, and measure."""
         still, swept = designed(bench, self.sizes)
         depths = still.depths
         advance = Steps(progress, 2 * len(depths) + 2)
         progress(0, advance.total)
         elements = still.elements
-        plain = still.measured(elements, elements, advance)  # one thing: it may stay as it is recorded
+        plain = still.measured(elements, elements, advance)  # same elements: the recording may be kept
         sharp, _ = still.recorded(elements, still.focus, noise=0)
         moved = swept.restored(elements, sharp, advance)
         scene = extended_depth.scene_pictures(
@@ -137,10 +137,10 @@ class Run:
 
 
 def designed(bench: Bench, sizes: Sizes = FULL) -> tuple[Sweeping, Sweeping]:
-    """The camera focused in the middle of the range of 1/Z, at rest, and the one that sweeps through its images.
+    """The camera focused in the middle of the range of 1/Z, static, and the one that sweeps through its images.
 
     Raises:
-        InputError: a range so small that nothing is out of focus.
+        InputError: a range too small for any defocus.
     """
     still = Sweeping(bench, round=True, sizes=sizes)
     return still, replace(still, travel=2 * MARGIN * still.reach * bench.focal_length**2)

@@ -1,4 +1,4 @@
-"""Depth of field as the contrast of fringes on a plane that comes nearer: measured, beside closed forms."""
+"""Depth of field as the contrast of fringes on a plane that approaches: measurements and closed forms."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PERIOD = 4
-"""Of the fringes, in lenslets: twice the finest that lenslets resolve."""
+"""Period of the fringes, in lenslets: twice the finest that lenslets resolve."""
 HALF_OF_SQUARE, HALF_OF_DISC = 0.60335, 0.70460
-"""Where sin(πx)/(πx), and where 2·J₁(πx)/(πx), is ½."""
+"""The x at which sin(πx)/(πx), and 2·J₁(πx)/(πx), equal ½."""
 
 
 @dataclass(frozen=True)
 class Sharpness:
-    """Contrast of fringes over depth, of what is 1 in the scene.
+    """Contrast of fringes over depth; it is 1 in the scene.
 
     Args:
         distances: metres, from the one in focus towards the camera.
         blurs: a point's blur disc on the lenslets, D·d·|1/Z − 1/F|, in lenslets.
-        refocused: measured in pictures refocused there.
+        refocused: measured in images refocused there.
         conventional: measured with pixels in place of the lenslets.
         each: N, pixels across a lenslet.
         f_number: of the whole lens.
@@ -47,14 +47,14 @@ class Sharpness:
 
     @property
     def reach(self) -> float:
-        """The blur at which refocused fringes have half the contrast they have in focus, in lenslets."""
+        """The blur at which refocused fringes have half their contrast in focus, in lenslets."""
         half = self.refocused[0] / 2
         after = max(int(np.argmax(self.refocused < half)), 2)
         near = np.s_[after - 2 : after + 1]  # a parabola through three points
         return float(np.polyval(np.polyfit(self.refocused[near], self.blurs[near], 2), half))
 
     def findings(self) -> list[Finding]:
-        """How far it reaches, and the contrast against its closed form."""
+        """The extension of the depth of field, and the contrast against its closed form."""
         extension = self.reach / (HALF_OF_DISC * PERIOD)
         by_windows = self.each * HALF_OF_SQUARE / HALF_OF_DISC
         best = np.sinc(1 / PERIOD)
@@ -127,18 +127,18 @@ def disc_mtf(blurs: Array) -> Array:
 
 
 def fringes(slope: float, width: float, distance: float, lenslets: int) -> LightField:
-    """(1 + cos)/2 across, on a plane, its period PERIOD lenslets wide for the middle of the lens.
+    """Fringes (1 + cos)/2 along rows, on a plane; the period is PERIOD lenslets seen from the middle of the lens.
 
     Args:
         slope: between neighbouring lenslets, seen from the middle of the lens.
         width: of the lens, metres.
         distance: of the plane, metres.
-        lenslets: how many the plane fills.
+        lenslets: number that the plane covers.
     """
     finer = 8
     places = (np.arange(lenslets * finer) - (lenslets * finer - 1) / 2) / finer / PERIOD
     row = (0.5 + 0.5 * np.cos(2 * np.pi * places)).astype(np.float32)
-    # All views of a flat thing are the same picture where they converge on it.
+    # For a flat object, all views are the same picture if they converge on it.
     values = np.ascontiguousarray(np.broadcast_to(row, (2, 2, len(row), len(row))))
     return LightField.from_views(
         values, width, slope / finer, distance, disparity_range=(0.0, 0.0), sample="point"

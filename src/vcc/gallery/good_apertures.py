@@ -42,20 +42,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LOW = 0.03
-"""Noise up to which the paper has optimised patterns."""
+"""Largest noise for which the paper has optimised patterns."""
 SEARCHED = (0.001, SHOWN, 0.02)
-"""The noises that patterns are searched for."""
+"""Noise levels for which patterns are searched."""
 SEARCH_PIXELS = 64
-"""Side of the pictures that a search has in mind."""
+"""Side of the images that a search assumes."""
 ANNULUS = 0.7
 """Inner over outer radius of the annulus; the paper's is after Welford (1960)."""
 TARGETS = {"pictures drawn from the prior": "drawn", "the middle view": "real"}
-"""What is recorded and deblurred, in words, and which error of `Judged` that gives."""
+"""Targets to record and deblur, as text, and the corresponding error of `Judged`."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """How much work a search is; see `vcc.analysis.optimised_aperture`."""
+    """Sizes of a search; see `vcc.analysis.optimised_aperture`."""
 
     population: int = 4000
     survivors: int = 400
@@ -64,12 +64,12 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """All apertures, judged at the same noises.
+    """All apertures, evaluated at the same noise levels.
 
     Args:
-        noises: shares of white through the whole opening; `SHOWN` and those searched for are among them.
+        noises: shares of white through the whole opening; include `SHOWN` and those of the searches.
         judged: by name, the circle first.
-        found: what the searches found, by the noise that they searched for.
+        found: results of the searches, by noise.
     """
 
     noises: tuple[float, ...]
@@ -78,7 +78,7 @@ class Compared:
 
     @property
     def circle(self) -> Judged:
-        """What all others are compared with."""
+        """The reference aperture."""
         return self.judged["circular"]
 
     @property
@@ -91,19 +91,19 @@ class Compared:
         return np.array([getattr(self.judged[name], kind) for name in published()])
 
     def over_circle(self, each: Judged, noise: float) -> float:
-        """R(K) at a noise, over that of the circle."""
+        """R(K) at a noise, relative to that of the circle."""
         at = self.noises.index(noise)
         return float(each.expected[at] / self.circle.expected[at])
 
 
 @dataclass(frozen=True)
 class Run:
-    """Search patterns; R(K) of all; deblur recordings through all of them.
+    """Search patterns; compute R(K) of all; deblur recordings through all of them.
 
     Args:
-        search: how much work each search is.
+        search: sizes of each search.
         target: largest side of the target, pixels.
-        noises: at which apertures are judged: `SHOWN`, those of `SEARCHED` and more.
+        noises: noise levels of the evaluation: `SHOWN`, those of `SEARCHED` and more.
     """
 
     search: Search = Search()
@@ -111,7 +111,7 @@ class Run:
     noises: tuple[float, ...] = NOISES
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Judge all apertures with the middle view of a light field."""
+        """Evaluate all apertures with the middle view of a light field."""
         steps = 100 * (len(SEARCHED) + 1)
         found = {
             noise: searched(noise, self.search, _after(progress, 100 * part, steps))
@@ -136,7 +136,7 @@ class Run:
 
 
 def ring(x: Array, y: Array) -> Array:
-    """The annulus: 1 where it is open, at places in metres."""
+    """The annulus: 1 where it is open, at positions in metres."""
     radius = np.hypot(x, y) / (OPENING / 2)
     return np.asarray((radius >= ANNULUS) & (radius < 1), dtype=np.float64)
 
@@ -154,7 +154,7 @@ def published() -> dict[str, Mask]:
 
 
 def searched(noise: float, search: Search, progress: Progress | None = None) -> OptimisedAperture:
-    """A pattern for a noise, by the paper's search."""
+    """A pattern for a noise level, by the paper's search."""
     power = natural_image_power((SEARCH_PIXELS, SEARCH_PIXELS), CONTRAST, MEAN)
     return optimised_aperture(
         noise,
@@ -168,7 +168,7 @@ def searched(noise: float, search: Search, progress: Progress | None = None) -> 
 
 
 def _after(progress: Progress, before: int, steps: int) -> Progress:
-    """Progress of a search among all steps, of which it has a hundred."""
+    """Progress of a search, which has a hundred steps, as part of all steps."""
     return lambda done, total: progress(before + 100 * done // total, steps)
 
 
@@ -177,7 +177,7 @@ def _searched_name(noise: float) -> str:
 
 
 def _expected(compared: Compared) -> Iterator[Finding]:
-    """What R(K) says of the published apertures."""
+    """R(K) of the published apertures."""
     circle, ours = compared.circle, compared.ours
     codes = [compared.judged[name].expected for name in ("Levin", "Veeraraghavan")]
     low = np.array(compared.noises) <= LOW
@@ -204,7 +204,7 @@ def _expected(compared: Compared) -> Iterator[Finding]:
 
 
 def _in_order(compared: Compared) -> Iterator[Finding]:
-    """Whether what is measured keeps the order of R(K)."""
+    """Whether the measured errors have the order of R(K)."""
     expected, foretold = compared.published("expected"), compared.published("foretold")
     for words, kind in TARGETS.items():
         errors, why = compared.published(kind), ""
@@ -234,7 +234,7 @@ def _in_order(compared: Compared) -> Iterator[Finding]:
 
 
 def _of_searches(compared: Compared) -> Iterator[Finding]:
-    """How good the patterns are that the searches found."""
+    """The quality of the patterns of the searches."""
     for noise in SEARCHED:
         each, at = compared.judged[_searched_name(noise)], compared.noises.index(noise)
         ratio = compared.over_circle(each, noise)

@@ -36,28 +36,28 @@ from vcc.showcase.words import away, paragraphs
 Floats = NDArray[np.float32]
 
 HARMONICS = 4
-"""Of the published mask: four cosines along each axis, 9×9 tiles and views."""
+"""Cosines along each axis of the published mask: four, for 9×9 tiles and views."""
 VIEWS = 2 * HARMONICS + 1
 SMALLEST_TILE = 24
 BORDER = 0.08
-"""Share of the sensor that recordings fade out over at each edge, and that is cut off the views."""
+"""Share of the sensor that is faded out at each edge, and cut off the views."""
 INSIDE = 0.96
-"""How much of what all views see the sensor looks at, so that no pixel looks past them."""
+"""Share of the area visible in all views that the sensor covers, so that all pixels lie within the views."""
 SAMPLES = 5
-"""Of the recorded light field for each pixel of a view: see `vcc.recover.band_limited`."""
+"""Samples of the recorded light field per pixel of a view: see `vcc.recover.band_limited`."""
 SHARPER = SAMPLES - 1.0
-"""How much finer detail than tiles hold the sharper scene has: nearly what these samples hold."""
+"""Resolution of the sharper scene relative to the tiles: nearly the limit of these samples."""
 WELL = 1000 / um**2
-"""Electrons that a pixel holds for each of its area, as sensors commonly do: 1/m²."""
+"""Electrons per area of a pixel, as is common for sensors: 1/m²."""
 READ_NOISE = 5.0
 """Electrons."""
 ENOUGH = 30.0
-"""Decibels that inner views should reach where the scene fits the tiles."""
+"""Decibels that inner views should reach if the scene fits the tiles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """What came of one recording.
+    """The result of one recording.
 
     Args:
         image: irradiance on the sensor.
@@ -71,7 +71,7 @@ class Decoded:
 
     @property
     def inner(self) -> float:
-        """The mean of all but the outermost ring, decibels."""
+        """The mean over all but the outermost ring, decibels."""
         return float(self.decibels[1:-1, 1:-1].mean())
 
 
@@ -80,9 +80,11 @@ class Run:
     """Record a scene that fits the tiles and a sharper one, decode, compare with the true views, refocus.
 
     Args:
-        tile: pixels of a view along the longer side; the published ones, 237×191, had sensors of 2133×1719 pixels.
-        parts: in which light fields are recorded: the whole of a band-limited one would take more than a gigabyte.
-        calibration_rays: for each pixel of the calibration recording.
+        tile: pixels of a view along the longer side; the published views, 237×191, had sensors of 2133×1719
+            pixels.
+        parts: number of parts in which light fields are recorded: a whole band-limited one would take more
+            than a gigabyte.
+        calibration_rays: per pixel of the calibration recording.
     """
 
     tile: int = 96
@@ -90,7 +92,7 @@ class Run:
     calibration_rays: int = 64
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take a light field through the camera and back, and measure."""
+        """Record a light field, decode it, and measure."""
         light_field = on_axis(bench.light_field)
         camera = designed(bench, light_field, self.tile)
         steps = Steps(progress, 2 * self.parts + 4)
@@ -129,16 +131,16 @@ def _counted(parts: Iterable[LightField], steps: Steps) -> Iterator[LightField]:
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """What was decoded, beside the true views.
+    """The decoded views, compared with the true ones.
 
     Args:
         bench: lens and distances.
         camera: with its mask of cosines last.
         taken: by name: "fitting" the tiles, "sharper", and "noisy".
-        truth: the views that the scene which fits came from.
+        truth: the views from which the fitting scene was made.
         white: radiance.
-        sharper: how many times as fine as tiles hold the sharper scene is.
-        refocused: pictures by the name of views ("decoded", "true", "noisy") and that of a distance.
+        sharper: resolution of the sharper scene relative to the tiles.
+        refocused: images by the name of views ("decoded", "true", "noisy") and that of a distance.
     """
 
     bench: Bench
@@ -159,7 +161,7 @@ class Compared:
         truth: LightField,
         sharper: float,
     ) -> Compared:
-        """Each set of views measured, and what fits refocused."""
+        """Measure each set of views, and refocus the fitting scene."""
         white = float(np.asarray(truth.values).max())
         taken = {
             name: Decoded(images[name], views[name], view_decibels(views[name], truth, white)) for name in images
@@ -174,7 +176,7 @@ class Compared:
         return cls(bench, camera, taken, truth, white, sharper, pictures)
 
     def findings(self) -> Iterator[Finding]:
-        """How close views and refocused pictures come."""
+        """The errors of views and refocused images."""
         fitting, sharper = self.taken["fitting"], self.taken["sharper"]
         inner = f"inner {VIEWS - 2}×{VIEWS - 2} views against the true ones, mean PSNR"
         yield Finding(
@@ -232,17 +234,18 @@ def _light_finding(passed: float) -> Finding:
 def designed(bench: Bench, light_field: LightField, most: int = 96) -> Camera:
     """A lens behind a square stop as wide as the grid of views, cosines, and a sensor.
 
-    A ray from u to x on the sensor, d behind the lens, passes the mask, g before it, at x_m = (1 − r)·x + r·u with
-    r = g/d. Over the stop A the first cosine has one period, P = r·A; its shadow on the sensor has P/(1 − r),
-    which is a pixel of a view, and 9 pixels of the sensor, so that 9 tiles fill the spectrum.
+    A ray from u to x on the sensor, d behind the lens, crosses the mask, g before the sensor, at x_m = (1 −
+    r)·x + r·u with r = g/d. Over the stop A the first cosine has one period, P = r·A. Its shadow on the
+    sensor has the period P/(1 − r), which is one pixel of a view and 9 pixels of the sensor, so that 9 tiles
+    fill the spectrum.
 
     Args:
         bench: lens and focus.
-        light_field: at the lens, in the middle of the axis.
-        most: pixels of a view along the longer side; fewer where the light field has few.
+        light_field: at the lens, centred on the axis.
+        most: pixels of a view along the longer side; fewer if the light field has few.
 
     Raises:
-        InputError: fewer views than the camera tells apart, or too few pixels.
+        InputError: fewer views than the camera separates, or too few pixels.
     """
     nv, nu = light_field.shape[:2]
     if min(nv, nu) < VIEWS:
@@ -271,7 +274,7 @@ def designed(bench: Bench, light_field: LightField, most: int = 96) -> Camera:
 
 
 def _seen_by_all(bench: Bench, light_field: LightField) -> tuple[list[float], list[float]]:
-    """Across and down: how wide on the sensor is what all views see, and how far apart pixels land, metres."""
+    """Across and down, metres: width on the sensor that all views cover, and spacing of their pixels there."""
     sensor = Sensor(bench.image_distance(bench.masked_focus), (2, 2), 1 * um)
     lens_alone = Camera([Lens(bench.focal_length)], sensor)
     sizes, steps = [], []
@@ -289,7 +292,7 @@ def _seen_by_all(bench: Bench, light_field: LightField) -> tuple[list[float], li
 
 
 def _tile(size: float, step: float, most: int) -> int:
-    """Pixels of a view; each holds two of the light field's or more, or there is nothing to filter away."""
+    """Pixels of a view; each covers at least two of the light field's, otherwise there is nothing to filter."""
     tile = min(most, int(size / step / 2))
     if tile < SMALLEST_TILE:
         raise InputError(
@@ -305,7 +308,7 @@ def _electronics(pitch: tuple[float, float]) -> Electronics:
 
 
 def on_axis(light_field: LightField) -> LightField:
-    """The light field with its views from left to right and from top to bottom about the axis, as decoded ones."""
+    """The light field centred on the axis, its views from left to right and from top to bottom as decoded ones."""
     nv, nu = light_field.shape[:2]
     linear = light_field.frame.linear
     ordered = light_field[:: 1 if linear[1, 1] > 0 else -1, :: 1 if linear[0, 0] > 0 else -1]
@@ -314,39 +317,39 @@ def on_axis(light_field: LightField) -> LightField:
 
 
 def recorded(camera: Camera, parts: Iterable[LightField]) -> Image:
-    """The recording of a light field that comes in parts: the sum of theirs."""
+    """The recording of a light field given in parts: the sum of their recordings."""
     total: Image | None = None
-    found = 0.0  # the share of the rays that the camera asks for
+    found = 0.0  # share of the requested rays
     with warnings.catch_warnings():
-        # A part of the views leaves the rest of the sensor dark; all of them together do not.
+        # A part of the views leaves the rest of the sensor dark, but their sum covers it.
         warnings.simplefilter("ignore", ResultWarning)
         for part in parts:
-            # Views fill the aperture as they are, one a cell: nothing is invented between them.
+            # Each view fills its cell of the aperture: no interpolation between views.
             image = camera.capture(part, between_views="none", interpolation="cubic")
             found += 1 - image.missing_rays
             total = image if total is None else replace(image, values=total.to_numpy() + image.to_numpy())
-    assert total is not None  # there are parts
+    assert total is not None  # there is at least one part
     return replace(total, missing_rays=max(1 - found, 0.0))
 
 
 def transmission(camera: Camera, calibration: Image) -> float:
-    """The share of the light that passes the cosines, by the calibration recording."""
+    """The transmission of the cosines, from the calibration recording."""
     width, height = (PINHOLE_SHARE * period for period in HeterodyneGeometry.of(camera).aperture_period)
     return float(calibration.to_numpy().mean(dtype=np.float64)) / (width * height / camera.sensor.z**2)
 
 
 def _own_fineness(light_field: LightField, camera: Camera) -> float:
-    """How many times as fine as decoded views the light field's own are, at the sensor."""
+    """Resolution of the light field's own views relative to decoded views, at the sensor."""
     carrier = HeterodyneGeometry.of(camera).carrier
     landed = [places_on_sensor(light_field, camera, axis)[0, :2] for axis in (0, 1)]
     return min(1 / (carrier[axis] * float(abs(np.diff(landed[axis])[0]))) for axis in (0, 1))
 
 
-# --- what came of it ---
+# --- results ---
 
 
 def equally_sampled(bench: Bench, light_field: LightField, camera: Camera) -> LightField:
-    """What pinholes at the decoded views' places see, where the scene is known; else the views that there are."""
+    """The images of pinholes at the positions of the decoded views if the scene is known; else the given views."""
     if bench.scene is None:
         return light_field
     linear = light_field.frame.linear
@@ -361,7 +364,7 @@ def equally_sampled(bench: Bench, light_field: LightField, camera: Camera) -> Li
 
 
 def view_decibels(views: LightField, truth: LightField, white: float) -> NDArray[np.float64]:
-    """How close each view comes to the true one, (v, u)."""
+    """PSNR of each view against the true one, (v, u)."""
     error = np.asarray(views.values, np.float64) - np.asarray(truth.values)
     power = np.mean(error**2, axis=tuple(range(2, error.ndim)))
     return np.array([[decibels(float(each), white) for each in row] for row in power])

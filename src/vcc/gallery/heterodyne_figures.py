@@ -1,4 +1,4 @@
-"""Drawings of the heterodyne camera's recordings, their spectra and what is decoded from them."""
+"""Figures of the heterodyne camera's recordings, their spectra and the decoded views."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ Floats = NDArray[np.float32]
 TRANSMITTED = 0.25
 """The mean of the cosines: ½ along each axis."""
 PERIODS = 8
-"""Of the mask's shadow, in the part of the recording that is magnified."""
+"""Periods of the mask's shadow in the magnified part of the recording."""
 DECADES = 15.0
-"""Of power shown in spectra, from the strongest down."""
+"""Decades of power shown in spectra, from the strongest down."""
 
 
 def recording_figure(camera: Camera, image: Image, white: float) -> Figure:
-    """The recording, the part of it that the mask's shadow shows in the most, and as much of the mask.
+    """The recording, its part with the strongest shadow of the mask, and a corresponding part of the mask.
 
     Args:
         camera: with its mask of cosines last.
@@ -85,13 +85,13 @@ def recording_figure(camera: Camera, image: Image, white: float) -> Figure:
 
 
 def spectra_figure(camera: Camera, images: dict[str, Image]) -> Figure:
-    """Power spectra of recordings side by side, with the tiles' outlines; their names are the titles."""
+    """Power spectra of recordings side by side, with the outlines of tiles; the names are the titles."""
     geometry = HeterodyneGeometry.of(camera)
     harmonics = geometry.harmonics
     f_x, f_y = (carrier * mm for carrier in geometry.carrier)
     figure = figures.new_figure(14.0, 6.8)
     panels = figure.subplots(1, len(images), sharey=True)
-    # Faded out at its edges as decoding does it, or these would draw a cross over all tiles.
+    # Faded out at the edges as in decoding, otherwise the edges would cause a cross over all tiles.
     fade = np.multiply.outer(*(np.hanning(n) for n in camera.sensor.shape)).astype(np.float32)
     for axes, (title, image) in zip(panels, images.items(), strict=True):
         values = image.to_numpy()
@@ -117,10 +117,10 @@ def spectra_figure(camera: Camera, images: dict[str, Image]) -> Figure:
 
 
 def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: float) -> Figure:
-    """Two views of the middle row, from near both ends of the aperture.
+    """Two views of the middle row, near both ends of the aperture.
 
     Args:
-        columns: titles, and for each views and their decibels, (v, u), where they have any.
+        columns: titles, with views and their decibels, (v, u), if there are any.
         white: radiance.
     """
     some = next(iter(columns.values()))[0]

@@ -28,29 +28,29 @@ Array = NDArray[np.float64]
 SIDE = 3
 """Pairs a side."""
 TO_LENS = 50 * mm
-"""From the array to the main lens."""
+"""Distance from the array to the main lens."""
 MAIN, OPENING = 25 * mm, 2 * mm
 """Focal length and opening of the main lens."""
 REACH = 0.92
-"""How much of the light field's angle the views use; the rest is for openings that are no points."""
+"""Share of the light field's angle that the views use; the rest allows for the finite opening."""
 FARTHEST = 7.5
-"""Pixels a view: what moves farther from view to view is not measured (`vcc.fields.parallax`)."""
+"""Largest disparity, pixels per view, that is measured (`vcc.fields.parallax`)."""
 BORDER = 0.06
-"""Share of each window at each side that decoding leaves out: there the edges of neighbours are blurred in."""
+"""Share of each window at each side that decoding discards, because blurred edges of neighbours reach it."""
 
 
 @dataclass(frozen=True)
 class Integral:
-    """The camera, and where its views are.
+    """The camera, and the positions of its views.
 
-    Through the pair at c the middle of the main lens sees, at the place c + ξ of the array, the slope
-    c/F − κ·ξ with κ = 1/L + 1/|f|: all these rays meet 1/κ behind the array, at c·(1 + 1/(κ·F)).
+    Through the pair at c, the middle of the main lens sees the slope c/F − κ·ξ at the place c + ξ of the
+    array, with κ = 1/L + 1/|f|. All these rays meet 1/κ behind the array, at c·(1 + 1/(κ·F)).
 
     Args:
         camera: the array, the main lens and the sensor.
         cell: p, the pitch of the array, metres.
         focal_length: f of the negative lenses, metres.
-        vergence: 1/F, F being where the views converge, 1/metres.
+        vergence: 1/F, where the views converge at F, 1/metres.
     """
 
     camera: Camera
@@ -65,25 +65,25 @@ class Integral:
 
     @property
     def magnification(self) -> float:
-        """Of the array on the sensor: d/L."""
+        """Magnification of the array on the sensor: d/L."""
         return (self.camera.sensor.z - TO_LENS) / TO_LENS
 
     @property
     def slope(self) -> float:
-        """By which neighbouring pixels of a view differ."""
+        """Slope between neighbouring pixels of a view."""
         return self.camera.sensor.pitches[1] / self.magnification * self.spread
 
     def place(self, index: int) -> float:
-        """Of the middle of a row or column of pairs on the array, metres."""
+        """Position of the middle of a row or column of pairs on the array, metres."""
         return (index - (SIDE - 1) / 2) * self.cell
 
     def view_place(self, index: int) -> float:
-        """From where the pair looks, in the plane 1/κ behind the array, metres."""
+        """Position of the pair's viewpoint, in the plane 1/κ behind the array, metres."""
         return self.place(index) * (1 + self.vergence / self.spread)
 
 
 def run(bench: Bench, progress: Progress) -> Result:
-    """One recording of nine views, cut into a light field, beside what pinholes there would see."""
+    """One recording of nine views, cut into a light field, against the images of pinholes there."""
     integral = designed(bench)
     progress(0, 4)
     image = _captured(integral.camera, bench.light_field)
@@ -121,24 +121,24 @@ def run(bench: Bench, progress: Progress) -> Result:
 
 
 def designed(bench: Bench) -> Integral:
-    """An array over the whole aperture, its lenses as strong as the light field is wide in angle."""
+    """An array over the whole aperture; its lenses match the angle of the light field."""
     light_field = bench.light_field
     linear = light_field.frame.linear
     pixels = light_field.shape[2:4]
     slopes = abs(float(linear[3, 3])), abs(float(linear[2, 2]))
     cell = APERTURE / SIDE
     vergence = float(linear[2, 0] / linear[0, 0])
-    # Within a cell the views of the light field move on by ξ/F, which its pictures must hold too.
+    # Within a cell, the views of the light field shift by ξ/F, which their pictures must also cover.
     half_angle = (
         REACH * min(slope * n for slope, n in zip(slopes, pixels, strict=True)) / 2 - abs(vergence) * cell / 2
     )
-    # As strong as the angle asks for, and at least a little negative.
+    # As strong as the angle requires, and at least slightly negative.
     power = max(half_angle / (cell / 2) - 1 / TO_LENS, 1.0)
     focal_length = -1 / power
     virtual = 1 / (1 / bench.middle + power)
     to_sensor = 1 / (1 / MAIN - 1 / (TO_LENS + virtual))
     pitch = max(slopes) / (1 / TO_LENS + power) * to_sensor / TO_LENS
-    # A whole, even number of pixels for each cell.
+    # An even number of pixels per cell.
     window = int(cell * to_sensor / TO_LENS / pitch) // 2 * 2
     pitch = cell * to_sensor / TO_LENS / window
     across = (np.arange(SIDE) - (SIDE - 1) / 2) * cell * (-1 / TO_LENS - vergence)
@@ -149,34 +149,35 @@ def designed(bench: Bench) -> Integral:
 
 
 def cut(integral: Integral, recorded: NDArray[np.float32]) -> LightField:
-    """The light field that a recording holds, in the plane z = 1/κ, its views upright.
+    """The light field of a recording, in the plane z = 1/κ, its views upright.
 
     Args:
         integral: the camera.
-        recorded: (rows, columns[, channels]) as light lands, radiance.
+        recorded: (rows, columns[, channels]) in the orientation of the sensor, radiance.
     """
     upright = recorded[::-1, ::-1]
     window = recorded.shape[0] // SIDE
     margin = round(BORDER * window)
-    # The array lies on the sensor upside down, hence upright here: the upper left window is the upper left pair's.
+    # The array's image is upside down on the sensor, hence upright here: the upper left window belongs to the
+    # upper left pair.
     tiles = upright.reshape(SIDE, window, SIDE, window, *recorded.shape[2:]).swapaxes(1, 2)
-    # Within a window, ξ grows to the right, and slopes fall with it, as in any upright view.
+    # Within a window, ξ grows to the right, and slopes decrease, as in any upright view.
     values = tiles[:, :, margin : window - margin, margin : window - margin]
     spacing = integral.view_place(1) - integral.view_place(0)
-    # At the plane of the views, slopes c/F belong to places c·(1 + 1/(κF)): they converge at F + 1/κ.
+    # At the plane of the views, slopes c/F belong to positions c·(1 + 1/(κF)): they converge at F + 1/κ.
     converging = 1 / integral.vergence + 1 / integral.spread if integral.vergence > 0 else math.inf
     return LightField.from_views(np.ascontiguousarray(np.maximum(values, 0)), spacing, integral.slope, converging)
 
 
 def _captured(camera: Camera, light_field: LightField) -> Image:
     with warnings.catch_warnings():
-        # Here and there it looks past the views; the comparison with the truth counts that.
+        # Some pixels lie outside the views; the comparison with the truth includes them.
         warnings.simplefilter("ignore", ResultWarning)
         return camera.capture(light_field, samples=32)
 
 
 def _separation(bench: Bench, integral: Integral) -> Finding:
-    """How much of the light through the middle pair falls outside its window."""
+    """The share of the light through the middle pair that falls outside its window."""
     only = Mask(Open(), width=integral.cell, name="middle pair alone")
     camera = Camera([only, *integral.camera.elements], integral.camera.sensor)
     alone = _captured(camera, bench.light_field).to_numpy().astype(np.float64)
@@ -198,7 +199,7 @@ def _separation(bench: Bench, integral: Integral) -> Finding:
 
 
 def _against_truth(bench: Bench, integral: Integral, decoded: LightField) -> Finding:
-    """The decoded views against the scene's closed form from the pinholes where they should be."""
+    """The decoded views against the scene's closed form from pinholes at their nominal positions."""
     assert bench.scene is not None
     points = 4
     behind = 1 / integral.spread
@@ -230,14 +231,14 @@ def _against_truth(bench: Bench, integral: Integral, decoded: LightField) -> Fin
 
 
 def _disparities(bench: Bench, decoded: LightField, behind: float) -> list[Finding]:
-    """The range of disparities of the decoded views beside that of the light field, in decoded pixels."""
+    """The range of disparities of the decoded views against that of the light field, in decoded pixels."""
     measured = decoded.measured_disparity_range()
     if measured is None:
         return []
     nearest, farthest = (min(bench.scene.distances), max(bench.scene.distances)) if bench.scene else (0.0, 0.0)
     if bench.scene is None:
         given = bench.light_field.measured_disparity_range()
-        assert given is not None  # the bench refuses light fields without parallax
+        assert given is not None  # the bench rejects light fields without parallax
         farthest, nearest = (bench.light_field.distance_of(disparity) for disparity in given)
     # Distances count from the entrance plane; the views lie 1/κ behind it.
     expected = [decoded.disparity_of(distance + behind) for distance in (farthest, nearest)]

@@ -1,4 +1,4 @@
-"""Apertures judged by how well their blur can be undone: expected by R(K), and measured."""
+"""Apertures evaluated by how well their blur can be removed: the expected error R(K), and measured errors."""
 
 from __future__ import annotations
 
@@ -20,29 +20,29 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BLUR = 13
-"""Pixels across the opening: one for each cell of the codes of 13×13."""
+"""Pixels across the opening: one per cell of the codes of 13×13."""
 NOISES = (0.0001, 0.001, 0.002, 0.005, 0.008, 0.01, 0.02, 0.03, 0.05, 0.1)
 """Standard deviations, shares of white through the whole opening."""
 SHOWN = 0.005
 """The noise of the pictures shown, and of a search."""
 CONTRAST, MEAN = 0.2, 0.5
-"""Standard deviation and mean of the pictures' pixels."""
+"""Standard deviation and mean of the images' pixels."""
 DIFFERENT = 1.05
-"""Errors whose ratio is less than this count as alike when orders are compared."""
+"""Errors whose ratio is smaller count as equal when orders are compared."""
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """An aperture, what is expected of it and what it did.
+    """An aperture with its expected and measured errors.
 
     Args:
-        name: in words.
+        name: as text.
         mask: in the opening.
-        kernel: its picture of a point; the sum is the light passed.
+        kernel: its image of a point; the sum is the transmission.
         expected: R(K) per pixel, at each noise.
-        drawn: mean squared error of deblurred pictures drawn from the prior, likewise.
+        drawn: mean squared error of deblurred images drawn from the prior, likewise.
         real: that of the deblurred view, likewise.
-        foretold: what ``real`` should be by the view's own spectrum, likewise.
+        foretold: the expected value of ``real``, from the view's own spectrum, likewise.
         picture: the view deblurred at the noise `SHOWN`.
     """
 
@@ -57,14 +57,14 @@ class Judged:
 
 
 def judge(name: str, mask: Mask, real: Array, drawn: Array, noises: tuple[float, ...] = NOISES) -> Judged:
-    """What is expected of an aperture, and what recordings through it become."""
+    """Compute the expected errors of an aperture, and measure those of deblurred recordings."""
     kernel = flat_target.kernel(mask, BLUR)
     power = natural_image_power((real.shape[0], real.shape[1]), CONTRAST, MEAN)
     expected = [expected_deblurring_error(kernel, noise, power) / power.size for noise in noises]
     errors: list[list[float]] = []
     shown = np.zeros_like(real)
     for seed, target in enumerate((drawn, real)):
-        # Half the contrast and half the noise: the same, and nothing goes below black.
+        # Half the contrast with half the noise is equivalent, and no value is below black.
         recording = 2 * flat_target.recorded(mask, MEAN + (target - MEAN) / 2, BLUR) - MEAN * kernel.sum()
         draws = np.random.default_rng((1, seed)).standard_normal(target.shape)  # the same for all apertures
         errors.append([])
@@ -79,7 +79,7 @@ def judge(name: str, mask: Mask, real: Array, drawn: Array, noises: tuple[float,
 
 
 def deblurred(recording: Array, kernel: Array, noise: float) -> Array:
-    """By the Wiener filter with the prior of R(K); the kernel sums to the share of light that passes."""
+    """A recording deblurred by the Wiener filter with the prior of R(K); the kernel sums to the transmission."""
     passed = float(kernel.sum())
     power = natural_image_power((recording.shape[0], recording.shape[1]), CONTRAST, MEAN)
     strength = math.sqrt(power[0, 1]) / recording.shape[1]  # P = c/f², here at one period over the picture
@@ -88,13 +88,13 @@ def deblurred(recording: Array, kernel: Array, noise: float) -> Array:
 
 
 def foretold_error(kernel: Array, noise: float, picture: Array) -> float:
-    """The mean squared error that this filter leaves of this picture, in the mean over the noise.
+    """The expected mean squared error of this picture after this filter, averaged over the noise.
 
-    What the filter W takes of the picture, |1 − K·W|²·|F|², and what it lets through of the noise, σ²·|W|²: with
-    |F|² the prior's P, this is R(K).
+    The filter W loses |1 − K·W|²·|F|² of the picture, and passes σ²·|W|² of the noise. If |F|² is the prior's
+    P, the sum is R(K).
     """
     prior = natural_image_power((picture.shape[0], picture.shape[1]), CONTRAST, MEAN)
-    prior[0, 0] = np.inf  # the filter leaves the mean as it is
+    prior[0, 0] = np.inf  # the filter keeps the mean
     own = np.abs(np.fft.fft2(picture)) ** 2 / picture.size
     passed = np.abs(np.fft.fft2(kernel, s=picture.shape)) ** 2
     left = 1 / (passed * prior / noise**2 + 1)
@@ -102,21 +102,21 @@ def foretold_error(kernel: Array, noise: float, picture: Array) -> float:
 
 
 def picture_of_the_prior(shape: tuple[int, int], seed: int = 0) -> Array:
-    """A random picture whose expected power is that of the prior: a cloud, 1/f²."""
+    """A random image whose expected power is that of the prior, 1/f²."""
     power = natural_image_power(shape, CONTRAST, MEAN)
     power[0, 0] = 0
-    white = np.random.default_rng((2, seed)).standard_normal(shape)  # other numbers than any noise's
+    white = np.random.default_rng((2, seed)).standard_normal(shape)  # independent of all noise
     return np.asarray(MEAN + np.fft.ifft2(np.fft.fft2(white) * np.sqrt(power)).real)
 
 
 def with_contrast(picture: Array) -> Array:
-    """The picture with the mean and standard deviation of the prior, as far as black and white allow."""
+    """The picture with the mean and standard deviation of the prior, clipped to `MEAN` ± 1."""
     spread = max(float(picture.std()), 1e-6)
     return np.asarray(np.clip(MEAN + (picture - picture.mean()) * (CONTRAST / spread), MEAN - 1, MEAN + 1))
 
 
 def pairs_in_order(expected: Array, measured: Array) -> tuple[int, int]:
-    """How many pairs of apertures are measured in the expected order, of how many.
+    """The number of pairs of apertures measured in the expected order, and the number of pairs.
 
     Args:
         expected: errors, (apertures, noises); pairs that differ by less than `DIFFERENT` are not counted.
@@ -134,7 +134,7 @@ def pairs_in_order(expected: Array, measured: Array) -> tuple[int, int]:
 
 
 def rank_correlations(expected: Array, measured: Array) -> list[float]:
-    """Spearman's, at each noise; errors are (apertures, noises)."""
+    """Spearman's correlation at each noise; errors are (apertures, noises)."""
     from scipy.stats import spearmanr
 
     return [float(spearmanr(*both)[0]) for both in zip(expected.T, measured.T, strict=True)]

@@ -23,9 +23,9 @@ from vcc.showcase.bench import Bench
 from vcc.showcase.words import length, paragraphs
 
 STEP = 20 * mm
-"""How far before and behind the plane of the views new pictures are taken."""
+"""Distance of new viewpoints before and behind the plane of the views."""
 INNER = 0.1
-"""Share of a picture at each side that comparisons leave out: there the views end."""
+"""Share of an image at each side that comparisons exclude, because the views end there."""
 POINTS = 4
 """Points across a pixel at which the closed form is evaluated, each way."""
 WORDS = {
@@ -33,11 +33,11 @@ WORDS = {
     "linear": "quadrilinear",
     "along the parallax": "pinhole camera, blended along the parallax of the middle distance",
 }
-"""How a view that was left out is predicted."""
+"""The methods that predict an omitted view."""
 
 
 def run(bench: Bench, progress: Progress) -> Result:
-    """Leave out every second view and predict it; look from places where no camera stood."""
+    """Omit every second view and predict it; render from viewpoints without a camera."""
     light_field = bench.light_field
     if min(light_field.shape[:2]) < 3:
         raise InputError(
@@ -61,7 +61,7 @@ def run(bench: Bench, progress: Progress) -> Result:
 def _predicted(
     light_field: LightField, place: tuple[int, int], progress: Progress
 ) -> dict[str, NDArray[np.float64]]:
-    """The view at a place that every second view each way predicts, by the names of `WORDS`."""
+    """The view at a place, predicted from every second view each way, by the names of `WORDS`."""
     kept = light_field[::2, ::2]
     predicted = {}
     for done, method in enumerate(("nearest", "linear")):
@@ -112,26 +112,26 @@ def _linear(values: NDArray[np.generic], light_field: LightField) -> NDArray[np.
 def resampled_view(
     kept: LightField, light_field: LightField, place: tuple[int, int], interpolation: str
 ) -> NDArray[np.float64]:
-    """A view as samples around it predict it, interpolated in all four dimensions.
+    """A view predicted from the samples around it by interpolation in all four dimensions.
 
     Args:
         kept: every second view each way.
-        light_field: of which they were kept.
+        light_field: the original one.
         place: (row, column) of the view in it.
         interpolation: "nearest" or "linear".
     """
     row, column = place
     frame = light_field.frame @ Affine.translation(column, row, 0, 0)
-    # Only the neighbours matter, and a resampling holds all four dimensions in memory.
+    # Use the neighbours only, because resampling keeps all four dimensions in memory.
     near = kept[row // 2 : row // 2 + 2, column // 2 : column // 2 + 2]
-    # A hair to one side: half-way between two views the nearest one would be a matter of rounding.
+    # A slight shift: half-way between two views, rounding would decide which one is nearest.
     frame = frame @ Affine.translation(-0.01, -0.01, 0, 0) if interpolation == "nearest" else frame
     view = near.resampled(frame, (1, 1, light_field.shape[2], light_field.shape[3]), interpolation=interpolation)
     return _linear(view.values[0, 0], view)
 
 
 def _through_a_pinhole(kept: LightField, light_field: LightField, place: tuple[int, int]) -> NDArray[np.float64]:
-    """What a pinhole camera at a view's place records, its pixels those of the view."""
+    """The image of a pinhole camera at a view's position, with the pixels of the view."""
     row, column = place
     nt, ns = light_field.shape[2:4]
     u, v, s, t = light_field.frame([column, row, (ns - 1) / 2, (nt - 1) / 2])
@@ -141,7 +141,7 @@ def _through_a_pinhole(kept: LightField, light_field: LightField, place: tuple[i
 def pinhole_picture(
     given: LightField, like: LightField, hole: tuple[float, float], middle: tuple[float, float], z: float
 ) -> NDArray[np.float64]:
-    """A pinhole at (u, v), z behind the given light field, and a sensor that sees slopes as ``like`` does."""
+    """The image of a pinhole at (u, v), z behind the light field, on a sensor with the slopes of ``like``."""
     linear = like.frame.linear
     pitches = abs(float(linear[3, 3])), abs(float(linear[2, 2]))
     distance = 50 * mm
@@ -154,11 +154,12 @@ def pinhole_picture(
     )
     camera = Camera([Mask(Circle(diameter), z=z, decentre=hole, name="pinhole")], sensor)
     with warnings.catch_warnings():
-        # At its border the picture looks past the views; comparisons leave the border out.
+        # The border of the image lies outside the views; comparisons exclude it.
         warnings.simplefilter("ignore", ResultWarning)
         image = camera.capture(given, method="rays", samples=64).to_numpy()
     values = image.astype(np.float64) * distance**2 / (math.pi / 4 * diameter**2)
-    # As it lands, slopes grow with rows and columns; the views' own rows and columns may run against them.
+    # On the sensor, slopes grow with rows and columns; the rows and columns of the views may have the
+    # opposite order.
     values = values[:: 1 if linear[3, 3] > 0 else -1, :: 1 if linear[2, 2] > 0 else -1]
     return values if values.ndim == 3 else values[..., None]
 
@@ -166,7 +167,7 @@ def pinhole_picture(
 def _from_elsewhere(
     bench: Bench, progress: Progress
 ) -> tuple[list[tuple[str, str, str, figures.Shown]], list[Finding]]:
-    """Views from before and behind the plane of the cameras, beside the closed form where it is known."""
+    """Views from before and behind the plane of the cameras, against the closed form if it is known."""
     light_field = bench.light_field
     nv, nu, nt, ns = light_field.shape[:4]
     u, v, s, t = (float(x) for x in light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2]))
@@ -176,7 +177,7 @@ def _from_elsewhere(
         (("before", "From before the cameras", -STEP), ("behind", "From behind the cameras", STEP))
     ):
         progress(4 + done, 6)
-        # Nearer to the scene: the light field flies back first, and the pinhole stands in its new plane.
+        # Nearer to the scene: propagate the light field back first, with the pinhole in its new plane.
         flown = light_field.transformed(Affine.propagation(way)) if way < 0 else light_field
         picture = pinhole_picture(flown, light_field, (u, v), (s, t), max(way, 0.0))
         caption = f"{length(STEP)} from their plane, where no camera stood."
@@ -214,7 +215,7 @@ def _true_view(
 
 
 def _psnr(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-    """Peak signal-to-noise ratio in linear light inside the border, the peak being the truth's brightest."""
+    """Peak signal-to-noise ratio in linear light inside the border, with the truth's maximum as the peak."""
     rows, columns = (max(int(INNER * n), 1) for n in truth.shape[:2])
     inner = np.s_[rows:-rows, columns:-columns]
     return psnr(picture[inner], truth[inner])

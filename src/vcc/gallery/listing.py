@@ -1,4 +1,4 @@
-"""Which cameras there are; each is loaded when it is asked for."""
+"""The list of cameras; each module is loaded on demand."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ENTRIES = (
     "focal-sweep",
     "coded-exposure",
 )
-"""Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which holds an ``ENTRY``."""
+"""Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which defines an ``ENTRY``."""
 
 
 def entry(name: str) -> Entry:
@@ -42,5 +42,5 @@ def entry(name: str) -> Entry:
 
 
 def entries() -> list[Entry]:
-    """All of them."""
+    """All cameras."""
     return [entry(name) for name in ENTRIES]

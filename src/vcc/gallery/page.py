@@ -1,4 +1,4 @@
-"""The page of an entry, as HTML or Markdown: pictures, and what was measured beside what was claimed."""
+"""The page of an entry, as HTML or Markdown: pictures, and measurements with the claims."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from vcc.showcase.figures import write_figure
 from vcc.showcase.words import write_page
 
 JPEG_QUALITY = 88
-"""Of photographs on Markdown pages: below it, noise and fine print begin to suffer."""
+"""Quality of photographs on Markdown pages: below it, noise and fine print begin to suffer."""
 PHOTOGRAPHS = 0.5
-"""A figure is taken for photographs where as JPEG it takes less than this share of its PNG."""
+"""A figure counts as a photograph if its JPEG is smaller than this share of its PNG."""
 
 
 def write_entry(entry: Entry, result: Result, folder: Path) -> Path:
     """Write an entry's pictures and its page ``index.html``.
 
     Args:
-        entry: whose run it was.
-        result: what came of it.
-        folder: where to write; made if missing.
+        entry: the camera.
+        result: of its run.
+        folder: where to write; created if missing.
 
     Returns:
         The page.
 
     Raises:
-        InputError: the folder cannot be made.
+        InputError: the folder cannot be created.
     """
     folder = _made(folder)
     for row in result.pictures:
@@ -50,12 +50,12 @@ def write_entry_markdown(
 ) -> Path:
     """Write an entry's page as Markdown, ``NAME.md``, for a site or a repository.
 
-    Photographs and figures made of them are JPEG, other figures PNG.
+    Photographs and figures that contain them are JPEG, other figures PNG.
 
     Args:
-        entry: whose run it was.
-        result: what came of it.
-        folder: where to write the page; made if missing.
+        entry: the camera.
+        result: of its run.
+        folder: where to write the page; created if missing.
         pictures: folder for the pictures, to which the page has relative links; None for ``folder/NAME``.
         note: Markdown at the end of the page, such as how it was made.
 
@@ -63,7 +63,7 @@ def write_entry_markdown(
         The page.
 
     Raises:
-        InputError: a folder cannot be made.
+        InputError: a folder cannot be created.
     """
     folder = _made(folder)
     pictures = _made(folder / entry.name if pictures is None else pictures)
@@ -83,12 +83,12 @@ def write_entry_markdown(
 
 
 def pictures_markdown(rows: Sequence[Sequence[Picture]], folder: Path, pictures: Path) -> str:
-    """Write pictures, and say in Markdown what shows them.
+    """Write pictures, and return the Markdown that displays them.
 
     Args:
         rows: pictures side by side.
         folder: of the page.
-        pictures: folder for the pictures, which must be there.
+        pictures: folder for the pictures, which must exist.
     """
     there = PurePath(os.path.relpath(pictures, folder)).as_posix()
     return "\n\n".join(
@@ -106,7 +106,7 @@ def numbers_markdown(numbers: Sequence[Finding]) -> str:
 
 
 def plain(text: str) -> str:
-    """Text for Markdown, in which nothing is markup, not even between the bars of a table."""
+    """Text escaped for Markdown, also between the bars of a table."""
     return re.sub(r"([\\`*_\[\]|])", r"\\\1", escape(" ".join(text.split()), quote=False))
 
 
@@ -120,7 +120,7 @@ def _made(folder: Path) -> Path:
 
 
 def _row_markdown(row: Sequence[tuple[Picture, str]], there: str) -> str:
-    """Pictures side by side; where the ``div`` is not understood, one below the other."""
+    """Pictures side by side; one below the other if ``div`` is not supported."""
     figures = [
         f"<figure markdown>\n\n![{plain(picture.title)}]({there}/{file})\n\n"
         f"<figcaption><b>{escape(picture.title)}.</b> {picture.caption}</figcaption>\n\n</figure>"
@@ -130,9 +130,10 @@ def _row_markdown(row: Sequence[tuple[Picture, str]], there: str) -> str:
 
 
 def _compact(picture: Picture, folder: Path) -> str:
-    """Write a picture small enough for a site; returns its file's name.
+    """Write a picture in a compact format for a site; return the name of its file.
 
-    Lines and even areas stay sharp as PNG; what is far smaller as JPEG is a photograph, or a figure made of some.
+    Lines and uniform areas stay sharp as PNG. A picture that is far smaller as JPEG is a photograph, or a
+    figure with some.
     """
     from imagecodecs import jpeg8_encode, png_decode
 
@@ -149,7 +150,7 @@ def _compact(picture: Picture, folder: Path) -> str:
 
 
 def _write_png(picture: Picture, folder: Path, level: int | None = None) -> Path:
-    """Write a picture as PNG; the level of compression is for pictures that are no figures."""
+    """Write a picture as PNG; the level of compression applies to arrays only."""
     path = folder / f"{picture.name}.png"
     if not isinstance(picture.content, np.ndarray):
         write_figure(picture.content, path)

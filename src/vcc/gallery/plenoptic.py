@@ -1,4 +1,4 @@
-"""The hand-held plenoptic camera: refocused after the fact, its lens corrected by arithmetic (Ng et al. 2005)."""
+"""The hand-held plenoptic camera: refocused after capture, its lens corrected by computation (Ng et al. 2005)."""
 
 from __future__ import annotations
 
@@ -37,25 +37,25 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PITCH = 125 * um
-"""Of the lenslets, their f-number, and the pixels of 9 µm behind each: the prototype (Ng et al. 2005)."""
+"""Pitch of the lenslets, their f-number, and the pixels of 9 µm behind each: the prototype (Ng et al. 2005)."""
 F_NUMBER = 4.0
 EACH = 14
 """Pixels across a lenslet."""
 COARSEST, MOST = 2.0, 192
-"""Where lenslets of that pitch hold fewer pixels of the light field, or are more across, they are made wider."""
+"""Least light-field pixels per lenslet, and most lenslets across; lenslets are made wider if needed."""
 RAYS = 16
-"""For each pixel: 150 pixels make one of a refocused picture, so that few will do."""
+"""Rays per pixel: few are enough, because each pixel of a refocused image sums 150 pixels."""
 SPHERICAL, COMA = 1.8 * um, 1.2 * um
 """Root mean square optical path of the aberrations (Zernike terms 11 and 8)."""
 MARGIN = 8
-"""Lenslets at each border that are not compared: refocusing there asks for light from beyond it."""
+"""Lenslets at each border that comparisons exclude: refocusing there requires light from beyond it."""
 NEEDED = 35.0
-"""Decibels of refocused pictures."""
+"""Required decibels of refocused images."""
 
 
 @dataclass(frozen=True)
 class Plenoptic:
-    """The camera, and what belongs to it.
+    """The camera with its parameters.
 
     Args:
         bench: its lens, and the distances of its scene.
@@ -77,9 +77,9 @@ class Plenoptic:
 
     @classmethod
     def built(cls, bench: Bench, pitch: float, gap: float, lenslets: tuple[int, int], each: int) -> Plenoptic:
-        """Lenslets where the lens images the middle distance, the sensor a gap behind, micro-images that touch."""
+        """Lenslets in the image of the middle distance, the sensor a gap behind, micro-images that touch."""
         d = bench.image_distance(bench.middle)
-        # A micro-image of the lens is D·b/d wide, and they stand p·(1 + b/d) apart.
+        # A micro-image of the lens is D·b/d wide; the spacing is p·(1 + b/d).
         growth = 1 + gap / d
         diameter = pitch * growth * d / gap
         # An even number of lenslets has its middle between two.
@@ -101,7 +101,7 @@ class Plenoptic:
         return self.camera.sensor.pitches[1] * self.to_lenslets / self.gap
 
     def recorded(self, light_field: LightField, aberrations: Surface | None = None) -> Image:
-        """A recording with the sensor's noise, as irradiance, as light lands."""
+        """A recording with the sensor's noise, as irradiance, in the orientation of the sensor."""
         plates = [] if aberrations is None else [PhasePlate(aberrations, name="aberrations")]
         camera = Camera([*plates, *self.camera.elements], self.camera.sensor)
         return expose_image(_captured(camera, light_field, RAYS), camera.sensor, "auto").image()
@@ -111,15 +111,15 @@ class Plenoptic:
         return self.recorded(LightField.from_views(np.ones((2, 2, 8, 8), np.float32), 2 * self.diameter, 0.2))
 
     def decoded(self, raw: Image, white: Image) -> LightField:
-        """The light field at the lens, a view for each pixel of a micro-image."""
+        """The light field at the lens, one view per pixel of a micro-image."""
         grid = LensletGrid.of_camera(self.camera)
         with warnings.catch_warnings():
-            # The corners of micro-images lie outside of the round lens: their views are dark, and weigh nothing.
+            # The corners of micro-images lie outside the round lens: their views are dark, and have no weight.
             warnings.filterwarnings("ignore", message=".*white image is dark.*", category=ResultWarning)
             return decode_plenoptic(raw, grid, camera=self.camera, white=white, views=self.each)
 
     def refocuser(self, decoded: LightField) -> Refocuser:
-        """Sums of views, weighted by how much of their windows lies within the round lens."""
+        """Sums of views, weighted by the share of their windows within the round lens."""
         each = self.each
         places = (np.arange(each) - (each - 1) / 2) * self.window
         open_shares = Circle(self.diameter).mean(places[None, :], places[:, None], self.window, self.window)
@@ -127,9 +127,9 @@ class Plenoptic:
         return Refocuser(decoded, np.where(bright, open_shares, 0.0))
 
     def ideal(self, light_field: LightField, distance: float, samples: int = 256) -> Array:
-        """The picture of the same lens focused on a distance, a pixel for what a lenslet shows; upright radiance.
+        """The image of the same lens focused at a distance, one pixel per lenslet; upright radiance.
 
-        By rays, as the raw recording: both cameras then look at the same continuous light field.
+        It is made by rays, like the raw recording: both cameras then sample the same continuous light field.
         """
         to_sensor = self.bench.image_distance(distance)
         sensor = Sensor(to_sensor, self.lenslets, self.pitch * to_sensor / self.to_lenslets)
@@ -140,18 +140,18 @@ class Plenoptic:
 
 def _captured(camera: Camera, light_field: LightField, samples: int) -> Image:
     with warnings.catch_warnings():
-        # A few rays look past the views at the picture's borders, which are not compared.
+        # A few rays miss the views at the image's borders, which comparisons exclude.
         warnings.simplefilter("ignore", ResultWarning)
         return camera.capture(light_field, method="rays", samples=samples)
 
 
 @dataclass(frozen=True)
 class Run:
-    """One exposure, refocused near, in the middle and far; depth of field; aberrations undone.
+    """One exposure, refocused near, in the middle and far; depth of field; aberrations corrected.
 
     Args:
         each: pixels across a lenslet.
-        depths: over which depth of field is measured.
+        depths: number of depths for the depth of field.
     """
 
     each: int = EACH
@@ -177,7 +177,7 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Refocused:
-    """Pictures refocused from one recording, beside those of ideal cameras focused there.
+    """Images refocused from one recording, with those of ideal cameras focused there.
 
     Args:
         distances: by name, metres.
@@ -193,7 +193,7 @@ class Refocused:
 
     @classmethod
     def of(cls, plenoptic: Plenoptic, decoded: LightField) -> Refocused:
-        """On the three distances of the bench."""
+        """At the three distances of the bench."""
         bench, refocuser = plenoptic.bench, plenoptic.refocuser(decoded)
         pictures = tuple(_values(refocuser.at(distance)) for distance in bench.distances.values())
         ideal = tuple(plenoptic.ideal(bench.light_field, distance) for distance in bench.distances.values())
@@ -202,7 +202,7 @@ class Refocused:
 
     @property
     def decibels(self) -> list[float]:
-        """Of the pictures against the ideal ones."""
+        """PSNR of the images against the ideal ones."""
         return [psnr(one, other, self.peak) for one, other in zip(self.pictures, self.ideal, strict=True)]
 
     def findings(self) -> Iterator[Finding]:
@@ -230,18 +230,18 @@ class Refocused:
         ]
 
     def shown(self, picture: Array) -> figures.Shown:
-        """As screens want it."""
+        """An image for display."""
         return figures.values_shown(picture, self.peak)
 
 
 @dataclass(frozen=True, eq=False)
 class Aberrated:
-    """The lens with aberrations, refocused in the middle, beside the ideal camera.
+    """The lens with aberrations, refocused in the middle, against the ideal camera.
 
     Args:
-        before: what refocusing makes of its recording, upright radiance.
-        after: the same with rays resorted by the known deflection.
-        ideal: the ideal camera's picture.
+        before: the refocused image of its recording, upright radiance.
+        after: the same with rays corrected by the known deflection.
+        ideal: the ideal camera's image.
         decibels: of the first two against it.
     """
 
@@ -252,9 +252,10 @@ class Aberrated:
 
     @classmethod
     def of(cls, plenoptic: Plenoptic, white: Image, without: Refocused) -> Aberrated:
-        """Recorded anew, through a plate at the lens.
+        """A new recording, through a plate at the lens.
 
-        What stands at the lens bends no light away from it: micro-images of white, and so the white image, stay.
+        A plate at the lens does not deflect light away from the lens: the micro-images of white, and so the
+        white image, do not change.
         """
         bench = plenoptic.bench
         surface = Zernike.from_terms({11: SPHERICAL, 8: COMA}, plenoptic.diameter)
@@ -267,7 +268,7 @@ class Aberrated:
         return cls(before, after, ideal, (psnr(before, ideal, peak), psnr(after, ideal, peak)))
 
     def findings(self, plenoptic: Plenoptic) -> Iterator[Finding]:
-        """How much of the aberrations is taken out."""
+        """How far the aberrations are corrected."""
         before, after = self.decibels
         yield Finding("lens with aberrations, against the same without: PSNR", "", before, "dB")
         yield Finding(
@@ -303,13 +304,13 @@ def designed(bench: Bench, each: int = EACH) -> Plenoptic:
 
 
 def depth_of_field(plenoptic: Plenoptic, depths: int = 7) -> fringes.Sharpness:
-    """Fringes across, on so many planes ever nearer than the focus, recorded by both cameras."""
+    """Fringes along rows on ``depths`` planes, increasingly nearer than the focus, recorded by both cameras."""
     each = plenoptic.each
     blurs = np.linspace(0, 1.2 * fringes.HALF_OF_SQUARE * each * fringes.PERIOD, depths)
     per_blur = plenoptic.pitch / (plenoptic.diameter * plenoptic.to_lenslets)
     vergences = 1 / plenoptic.bench.middle + blurs * per_blur
     distances = tuple(1 / float(vergence) if vergence > 0 else math.inf for vergence in vergences)
-    # The outermost views are moved by half the blur; whole periods are left, and the fade to the opposite border.
+    # The outermost views shift by half the blur; keep whole periods, and the fade to the opposite border.
     columns = 2 * math.ceil(blurs[-1] / 2) + 8 * fringes.PERIOD + 1
     small = Plenoptic.built(plenoptic.bench, plenoptic.pitch, plenoptic.gap, (9, columns), each)
     white, slope = small.white(), small.pitch / small.to_lenslets
@@ -323,11 +324,11 @@ def depth_of_field(plenoptic: Plenoptic, depths: int = 7) -> fringes.Sharpness:
     return fringes.Sharpness(distances, blurs, np.array(refocused), np.array(conventional), each, number)
 
 
-# --- what is shown ---
+# --- pictures ---
 
 
 def psnr(picture: Array, truth: Array, peak: float) -> float:
-    """In decibels, `MARGIN` lenslets at each border left out."""
+    """Decibels, without `MARGIN` lenslets at each border."""
     inner = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
     return measures.psnr(picture[inner], truth[inner], peak)
 
@@ -402,7 +403,7 @@ def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> Figure:
 
 
 def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: float) -> Figure:
-    """The whole, and enlarged a piece of what is sharp when focused near."""
+    """The whole, and an enlarged part that is sharp when focused near."""
     from matplotlib.patches import Rectangle
 
     upright = _values(raw.upright()) / (math.pi / 4 * (plenoptic.pitch / plenoptic.gap) ** 2)

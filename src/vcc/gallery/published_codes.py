@@ -1,4 +1,4 @@
-"""Cells of coded apertures as their papers' figures show them, seen from the scene; # is open."""
+"""Cells of coded apertures from the figures of their papers, seen from the scene; # is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Wavefront coding: a cubic phase plate makes the blur alike at all depths (Dowski and Cathey 1995)."""
+"""Wavefront coding: a cubic phase plate makes the blur depth-invariant (Dowski and Cathey 1995)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ RATIO = 3.0
 
 @dataclass(frozen=True)
 class Pair:
-    """The camera with the plate and the one without, alike otherwise.
+    """The camera with the plate and the one without, otherwise equal.
 
     Args:
-        comparison: over which depths.
+        comparison: the range of depths.
         alpha: of the plate, radians.
         coded: the elements with the plate.
         plain: those without.
@@ -36,16 +36,16 @@ class Pair:
 
 @dataclass(frozen=True)
 class Run:
-    """Point-spread functions over depth, a flat target restored by one filter at each depth, and the scene.
+    """Point-spread functions over depth, a flat target restored by one filter for all depths, and the scene.
 
     Args:
-        sizes: how much work it is.
+        sizes: sizes that set the computing time.
     """
 
     sizes: Sizes = FULL
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
-        """Take a light field through both cameras, and measure."""
+        """Record a light field with both cameras, and measure."""
         pair = designed(bench, self.sizes)
         comparison, depths = pair.comparison, pair.comparison.depths
         advance = Steps(progress, 2 * len(depths) + 2)
@@ -64,7 +64,7 @@ def designed(bench: Bench, sizes: Sizes = FULL) -> Pair:
     """Focused in the middle of the range of 1/Z, with a plate for its ends.
 
     Raises:
-        InputError: a range so small that nothing is out of focus.
+        InputError: a range too small for any defocus.
     """
     comparison = Comparison(bench, sizes=sizes)
     alpha = RATIO * comparison.misfocus

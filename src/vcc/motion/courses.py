@@ -48,7 +48,7 @@ class Function(Brief):
     def __post_init__(self) -> None:
         if not callable(self.function):
             raise InputError(
-                "what changes with time is a function of seconds, vcc.motion.Steps or vcc.motion.Lines, not a "
+                "a course must be a function of seconds, vcc.motion.Steps or vcc.motion.Lines, not a "
                 f"{type(self.function).__name__}"
             )
         object.__setattr__(self, "breaks", _times(self.breaks))
@@ -109,7 +109,9 @@ class Lines(Brief, Value):
         object.__setattr__(self, "values", tuple(map(_numbers, self.values)))
         _check_as_many(self.times, self.values)
         if len(set(map(np.shape, self.values))) > 1:
-            raise InputError("some values of Lines are one number and some are several: give as many at each time")
+            raise InputError(
+                "some values of Lines are one number and some are several: give equally many at each time"
+            )
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -183,7 +185,7 @@ def _times(given: Iterable[float]) -> tuple[float, ...]:
     times = tuple(checks.finite("a time", each, "seconds") for each in given)
     for before, after in pairwise(times):
         if not before < after:
-            raise InputError(f"times ascend, and {after:g} s comes after {before:g} s: sort them")
+            raise InputError(f"times must ascend, but {after:g} s comes after {before:g} s: sort them")
     return times
 
 
@@ -196,4 +198,4 @@ def _numbers(given: Any) -> float | tuple[float, ...]:
 
 def _check_as_many(times: Sequence[float], values: Sequence[Any]) -> None:
     if not times or len(times) != len(values):
-        raise InputError(f"there are {len(times)} times and {len(values)} values: give as many, one at least")
+        raise InputError(f"there are {len(times)} times and {len(values)} values: give equally many, at least one")

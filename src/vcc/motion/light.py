@@ -83,7 +83,7 @@ class _Made(Brief):
         try:
             check_is_light_field(made)
         except InputError as error:
-            raise InputError(f"what the function of time gave at {time:g} s: {error}") from None
+            raise InputError(f"the function of time returned an invalid value at {time:g} s: {error}") from None
         return made
 
 

@@ -66,10 +66,10 @@ class MovingCamera(Brief):
 
     def __post_init__(self) -> None:
         if not isinstance(self.camera, Camera):
-            raise InputError(f"what moves is a vcc.Camera, not a {type(self.camera).__name__}")
+            raise InputError(f"camera must be a vcc.Camera, not a {type(self.camera).__name__}")
         if not isinstance(self.courses, Mapping):
             raise InputError(
-                'what changes is named, {"sensor.z": lambda t: 52 * mm + 0.1 * t}, not a '
+                'courses must be a mapping such as {"sensor.z": lambda t: 52 * mm + 0.1 * t}, not a '
                 f"{type(self.courses).__name__}"
             )
         object.__setattr__(self, "courses", {name: course(each) for name, each in self.courses.items()})
@@ -105,7 +105,7 @@ class MovingCamera(Brief):
         return tuple(sorted({time for each in changing for time in each.breaks}))
 
     def listed(self) -> list[str]:
-        """The changing parameters, one per line: ``"sensor.z goes evenly, 51 mm at 0 s, 53 mm at 90 ms"``."""
+        """The changing parameters, one per line: ``"sensor.z changes linearly, 51 mm at 0 s, 53 mm at 90 ms"``."""
         found = {name: (each, place(self.camera, name)) for name, each in self.courses.items()}
         lines = [f"{name} {course_in_words(*each)}" for name, each in found.items()]
         return [*lines, *([] if self.shutter is None else [f"shutter {course_in_words(self.shutter)}"])]
@@ -160,8 +160,8 @@ class MovingCamera(Brief):
         changing = [
             "What changes over time",
             *self.listed(),
-            f"what switches takes one picture for each state, what goes on changing {LEAST} moments or more from "
-            "break to break; what follows is the moment at which the exposure begins",
+            f"steps need one image for each state, other changes at least {LEAST} moments between breaks; the "
+            "rest of this text is about the start of the exposure",
         ]
         found = Explanation(wrapped("\n  ".join(changing)) + f"\n\n{one}")
         found.plan, found.expected_seconds = one.plan, one.expected_seconds
@@ -302,8 +302,8 @@ class _Work:
         if not reached:
             warn_of_result(
                 f"the error of the mean over time is estimated as {error:.2g}, {error / total.size():.2g} of "
-                f"the picture's mean, after {MOST} moments of a part of the exposure; {tolerance:g} was asked "
-                "for. Say at which times something jumps (vcc.motion.Steps, vcc.motion.Function(…, breaks=…))"
+                f"the picture's mean, after {MOST} moments of a part of the exposure; the tolerance is "
+                f"{tolerance:g}. Give the times of jumps (vcc.motion.Steps, vcc.motion.Function(…, breaks=…))"
             )
         return self._image(total, error, passed)
 
@@ -342,8 +342,8 @@ class _Work:
         camera, pixels = self._moving.at(time), self._moving.camera.sensor.shape
         if camera.sensor.shape != pixels:
             raise InputError(
-                f"the sensor has {camera.sensor.shape} pixels at {time:g} s and {pixels} else: pixels gather "
-                "light all the time, and stay as many"
+                f"the sensor has {camera.sensor.shape} pixels at {time:g} s and {pixels} otherwise: their "
+                "number must not change during an exposure"
             )
         frames = self._light.at(self._start + time)
         return [((camera, key), samples, share * through) for key, samples, share in frames]
@@ -394,8 +394,8 @@ def _gathered(image: Image, number: int) -> _Gathered:
     """An image as a term of the sum; its number identifies its error."""
     if not isinstance(image.values, np.ndarray):
         raise InputError(
-            f"a moving camera takes samples of NumPy, not of {library_of(image.values)}, "
-            "whose gradients would end here: sum pictures of camera.capture yourself"
+            f"a moving camera supports samples of NumPy, not of {library_of(image.values)}, "
+            "because it does not propagate gradients: sum images of camera.capture yourself"
         )
     return _Gathered(image.values.astype(np.float64), image.missing_rays, {number: image.sampling_error})
 

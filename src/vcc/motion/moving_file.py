@@ -67,7 +67,7 @@ def _moving(camera: Camera, table: Any, beside: Beside) -> MovingCamera:
     given: dict[str, Mapping[str, Any]] = {}
     for name, each in _listed(table):
         if name in given:
-            raise InputError(f"{name} is there twice, in quotes and without: leave one out")
+            raise InputError(f"{name} is given twice, in quotes and without: leave one out")
         given[name] = each
     courses, shutter = {}, given.pop(SHUTTER, None)
     for name, each in given.items():

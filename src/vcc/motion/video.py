@@ -43,7 +43,7 @@ class LightFieldVideo(Brief):
         late = next((n for n in range(1, len(times)) if not times[n - 1] < times[n]), None)
         if late is not None:
             raise InputError(
-                f"times of frames ascend, and frame {late} is at {times[late]:g} s, frame {late - 1} at "
+                f"times of frames must ascend, but frame {late} is at {times[late]:g} s, frame {late - 1} at "
                 f"{times[late - 1]:g} s"
             )
 

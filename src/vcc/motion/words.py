@@ -24,7 +24,7 @@ def course_in_words(course: Any, of: Parameter | None = None) -> str:
         of: the parameter, for the unit of its values; None for a shutter.
     """
     if isinstance(course, Lines):
-        return "goes evenly, " + _points(course, of, "{value} at {time}")
+        return "changes linearly, " + _points(course, of, "{value} at {time}")
     if isinstance(course, Steps):
         if of is None and (found := code_of(course)) is not None:
             return f"opens and shuts by the code {found[0]} in {short(found[1], 'time')}"

@@ -65,11 +65,11 @@ class Design(Brief):
                 f"{type(self.parameters).__name__}"
             )
         if not self.parameters and self.kind != "grid":
-            raise InputError(f"a {self.kind} of no parameters is none: give names and values")
+            raise InputError(f"a {self.kind} design needs parameters: give names and values")
         if not self.drawn:
             for name, default in (("count", None), ("seed", 0)):
                 if getattr(self, name) != default:
-                    raise InputError(f"{name} is for random and Sobol' designs; a {self.kind} has what it has")
+                    raise InputError(f"{name} applies to random and Sobol' designs only, not to a {self.kind}")
         if self.count is not None:
             checks.whole_number_between("count", self.count, 1, MOST_CAMERAS, of="cameras")
         checks.seed(self.seed)
@@ -97,7 +97,7 @@ class Design(Brief):
         found = tuple(varied(camera, name, given, Beside(self.folder)) for name, given in self.parameters.items())
         if self.kind == "list" and len({len(each) for each in found}) > 1:
             counts = ", ".join(f"{each.name} {len(each)}" for each in found)
-            raise InputError(f"a list takes as many values of each parameter, and there are {counts}")
+            raise InputError(f"a list needs equally many values of each parameter, and there are {counts}")
         return found
 
     def _points(self, dimensions: int) -> NDArray[np.float64]:
@@ -273,14 +273,14 @@ def cameras_of(cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any]
     several = [cameras] if isinstance(cameras, Camera) else list(cameras)
     for each in several:
         if not isinstance(each, Camera):
-            raise InputError(f"a sweep goes through vcc.Camera objects, not a {type(each).__name__}")
+            raise InputError(f"a sweep needs vcc.Camera objects, not a {type(each).__name__}")
     if not several:
-        raise InputError("a sweep goes through one camera at least, and there is none")
+        raise InputError("a sweep needs at least one camera, and there is none")
     found = design.of(several[0])
     together = design.kind != "grid"
     if not isinstance(cameras, Camera):
         if together:
-            raise InputError(f"several cameras go with a grid of parameters, not with a {design.kind}")
+            raise InputError(f"several cameras support a grid of parameters only, not a {design.kind}")
         names = [each.name for each in several]
         told_apart = all(names) and len(set(names)) == len(names)
         labels = names if told_apart else [str(n) for n in range(len(several))]
@@ -290,5 +290,5 @@ def cameras_of(cameras: Camera | Sequence[Camera], parameters: Mapping[str, Any]
         made = Cameras(several[0], (Varied(CAMERA, tuple(several), (several[0].name or "0",)),))
     if len(made) > MOST_CAMERAS:
         sizes = " × ".join(map(str, made.shape))
-        raise InputError(f"{sizes} are {len(made)} cameras, and a sweep goes through up to {MOST_CAMERAS}")
+        raise InputError(f"{sizes} are {len(made)} cameras, and a sweep supports up to {MOST_CAMERAS}")
     return made

@@ -117,7 +117,7 @@ class InStore(Results):
     def kept(self) -> str:
         """How many images the store has, as text."""
         done = self.swept.done
-        return f"{done.sum()} of {done.size} pictures are kept in {self.path}: the same sweep goes on from there"
+        return f"{done.sum()} of {done.size} pictures are kept in {self.path}: run the same sweep again to resume"
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
         """See `Results`.
@@ -147,8 +147,8 @@ class InStore(Results):
         wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
         if wanted and self._pictures is None and self.swept.done.any():
             raise InputError(
-                f"{self.path} keeps no pictures, of which {', '.join(wanted)} could be told: leave that out, or "
-                "choose another name for the sweep"
+                f"{self.path} keeps no pictures, which {', '.join(wanted)} would need: leave that out, or choose "
+                "another name for the sweep"
             )
         with self._disk("what is told of pictures"):
             for name in wanted:
@@ -291,13 +291,13 @@ def _check_same(folder: Path, wanted: dict[str, Any] | None) -> None:
     found = _stated(folder).get("description")
     if wanted is None or found is None:
         raise InputError(
-            f"{folder} is there already, and a sweep of functions of Python, of which nobody can tell whether "
-            "they are the same, is not gone on with: remove it, or choose another name"
+            f"{folder} is there already, and a sweep with Python functions cannot be resumed, because functions "
+            "cannot be compared: remove it, or choose another name"
         )
     if not same(wanted, found):
         raise InputError(
-            f"{folder} is another sweep, and results of two are never mixed. {difference(found, wanted)}. Remove "
-            "it, or choose another name"
+            f"{folder} is another sweep, and results of two sweeps are never mixed. {difference(found, wanted)}. "
+            "Remove it, or choose another name"
         )
 
 

@@ -121,7 +121,7 @@ class DeblurringError:
                 `vcc.analysis.psf`.
         """
         if not isinstance(image.camera, Camera):
-            raise InputError("R(K) is of a camera, and this picture does not know what made it")
+            raise InputError("R(K) requires the camera, and this image has none")
         found = psf(image.camera, self.distance, aperture=self.aperture)
         share = 1.0 if self.aperture is None else found.collecting_area / math.prod(self.aperture)
         power = natural_image_power((PRIOR, PRIOR))
@@ -142,7 +142,7 @@ def metrics_of(given: Mapping[str, Metric] | Iterable[str | Metric]) -> dict[str
         InputError: unknown name, not callable, a function without a name, or a repeated name.
     """
     if isinstance(given, str) or callable(given):
-        raise InputError(f"metrics are a list or go by name: write [{given!r}]")
+        raise InputError(f"metrics must be a list, or a mapping by name: write [{given!r}]")
     pairs: list[tuple[Any, Any]] = list(given.items()) if isinstance(given, Mapping) else []
     for each in () if isinstance(given, Mapping) else given:
         name = each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__.lower())

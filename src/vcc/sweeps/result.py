@@ -99,7 +99,7 @@ class Sweep(Shown):
         if self.pictures is None:
             raise InputError("this sweep kept no pictures, only the table")
         if not self.done[place]:
-            raise InputError(f"the picture at {place} is not there yet: go on with the sweep")
+            raise InputError(f"the picture at {place} is not done yet: resume the sweep")
         frame = self.frames if self.frames.ndim == 2 else self.frames[place]
         missing, error = (float(self.numbers[name][place]) for name in ("missing_rays", "sampling_error"))
         return Image(np.asarray(self.pictures[place]), Affine(frame), missing, error, camera=self._camera(place))
@@ -151,7 +151,7 @@ class Sweep(Shown):
         lines += [f"  {each.name} {each.values_in_words}" for each in self.coordinates]
         if self.pictures is not None:
             lines.append(f"  pictures of {'×'.join(map(str, self.pictures.shape[len(self.shape) :]))}")
-        return "\n".join([*lines, f"  told of each: {first_few_labels(tuple(self.numbers), 10)}"])
+        return "\n".join([*lines, f"  numbers of each: {first_few_labels(tuple(self.numbers), 10)}"])
 
     @property
     def _left(self) -> str:
@@ -209,7 +209,7 @@ class Results:
         return tuple(int(n) for n in np.unravel_index(number, self.swept.shape))
 
     def keep(self, place: tuple[int, ...], values: NDArray[np.float32]) -> None:
-        """Keep a picture."""
+        """Keep an image."""
 
     def output_buffers(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
         """The contiguous memory in which to make the images of some cameras; None if there is none."""

@@ -43,7 +43,7 @@ def contact_sheet(swept: Sweep) -> Any:
     if swept.pictures is None:
         raise InputError("this sweep kept no pictures to be shown, only the table")
     if not swept.done.any():
-        raise InputError("none of this sweep's pictures is there yet")
+        raise InputError("none of this sweep's pictures is done yet")
     places = _chosen(swept.shape)
     pictures = [[_small(swept, place) if place and swept.done[place] else None for place in row] for row in places]
     there = [each for row in pictures for each in row if each is not None]

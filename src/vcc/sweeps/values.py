@@ -133,7 +133,7 @@ def range_of(train: Train, name: str, given: Any) -> tuple[float, float] | None:
     ends = _quantities(given, found)
     if ends is None:
         raise InputError(
-            f"{name} goes from {given[0]!r} to {given[1]!r}, which are no numbers: give a list of values"
+            f"{name} goes from {given[0]!r} to {given[1]!r}, which are not numbers: give a list of values"
         )
     return ends[0], ends[1]
 

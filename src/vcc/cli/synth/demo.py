@@ -45,7 +45,7 @@ def demo(
     variant: Variant = "auto",
     dtype: SampleType = "float16",
 ) -> None:
-    """Render a scene of ours by Mitsuba: glass, gold and gloss, at several depths.
+    """Render a built-in scene with Mitsuba: glass, gold and gloss, at several depths.
 
     Args:
         name: The scene.

@@ -62,7 +62,7 @@ def depth(
     reading: ReadingDepth = ReadingDepth(),
     dtype: SampleType = "float16",
 ) -> None:
-    """Make the views around a picture from its depth; what no picture shows is made up behind edges.
+    """Make the views around a picture from its depth; hidden parts behind edges are filled in.
 
     Args:
         picture: The middle view.
@@ -78,7 +78,7 @@ def depth(
     pixels = (radiance.shape[0], radiance.shape[1])
     if reading.meaning == "disparity":
         if where.focus_distance is None:
-            raise InputError("disparities are against where the views converge: give --focus-distance")
+            raise InputError("disparities are relative to the convergence of the views: give --focus-distance")
         cameras = where.cameras(pixels=pixels)
         scene = DepthMapScene.from_disparity(radiance, found, cameras)
     else:
@@ -89,7 +89,7 @@ def depth(
         scene = DepthMapScene.for_cameras(radiance, distances, cameras)
     make(scene, cameras, output, dtype)
     corner = scene.uncovered(cameras.camera(0, 0))
-    show(f"{float(corner.mean()):.1%} of the view in the corner was made up: behind edges and beyond the border")
+    show(f"{float(corner.mean()):.1%} of the corner view was filled in: behind edges and beyond the border")
 
 
 def _check_distances(distances: NDArray[np.float64], path: Path) -> None:

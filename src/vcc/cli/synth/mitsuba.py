@@ -34,7 +34,7 @@ def mitsuba(
     variant: Variant = "auto",
     dtype: SampleType = "float16",
 ) -> None:
-    """Render any scene of Mitsuba 3. Its own sensor says where the middle of the views stands and looks.
+    """Render any scene of Mitsuba 3. Its own sensor defines the position and direction of the middle view.
 
     Args:
         scene: A scene of Mitsuba 3, .xml.

@@ -73,7 +73,7 @@ class Looking:
 
     def __post_init__(self) -> None:
         if self.target is not None and self.eye is None:
-            raise InputError("--target says where the views look from --eye: give --eye too, or --direction")
+            raise InputError("--target is the point seen from --eye: give --eye too, or --direction")
 
     def renderer(
         self, meshes: list[Path], narrow: CameraArray, background: Vector, supersampling: int
@@ -105,7 +105,7 @@ def opengl(
     supersampling: Annotated[Whole, Parameter(group=HOW)] = 1,
     dtype: SampleType = "float16",
 ) -> None:
-    """Draw meshes by OpenGL, textured and simply lit: quick, without shadows, mirrors and glass.
+    """Draw meshes with OpenGL, textured and simply lit: fast, without shadows, mirrors and glass.
 
     Args:
         mesh: Files .glb, .gltf, .obj or .ply, in one scene.
@@ -121,7 +121,7 @@ def opengl(
     focus = cameras.focus_distance
     converge = "parallel views" if math.isinf(focus) else f"views converge at {short(focus, digits=3)}"
     show(
-        f"things are {short(near, digits=3)} to {short(far, digits=3)} away; {converge}, "
+        f"objects are {short(near, digits=3)} to {short(far, digits=3)} away; {converge}, "
         f"{short(cameras.spacings[1], digits=3)} apart: {low:.3g} to {high:.3g} pixels per view"
     )
     make(renderer, cameras, output, dtype)

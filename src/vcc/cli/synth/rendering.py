@@ -29,24 +29,24 @@ Angle = Annotated[
     float,
     quantity("ANGLE", _angle, written=lambda angle: short(angle, "angle")),
 ]
-Store = Annotated[Path, Parameter(alias="-o", metavar="STORE.zarr", help="The store to write, or to go on with.")]
-Unit = Annotated[Length, Parameter(group=WHERE, help='How long a unit of the scene is, "1 m", "1 cm".')]
+Store = Annotated[Path, Parameter(alias="-o", metavar="STORE.zarr", help="The store to write or to resume.")]
+Unit = Annotated[Length, Parameter(group=WHERE, help='Length of a unit of the scene, "1 m", "1 cm".')]
 SampleType = Annotated[
     Literal["float16", "float32", "uint8", "uint16"],
     Parameter(
         group=HOW,
-        help="What samples are kept as: float16 and float32 hold linear radiance as it is; in uint8 and uint16 "
-        "full scale is radiance 1, and what is brighter is cut off.",
+        help="Type of the stored samples: float16 and float32 hold linear radiance as it is; in uint8 and uint16 "
+        "full scale is radiance 1, and brighter values are clipped.",
     ),
 ]
 Samples = Annotated[Whole, Parameter(group=HOW, help="Paths per pixel.")]
-Seed = Annotated[Whole, Parameter(group=HOW, help="Of the noise: the same gives the same pictures.")]
+Seed = Annotated[Whole, Parameter(group=HOW, help="Of the noise: the same seed gives the same views.")]
 Variant = Annotated[
     str,
     Parameter(
         group=HOW,
         metavar="NAME",
-        help="Of Mitsuba. auto takes llvm_ad_rgb where the system's LLVM lets it work, and else scalar_rgb.",
+        help="Variant of Mitsuba. auto is llvm_ad_rgb if the system has a suitable LLVM, otherwise scalar_rgb.",
     ),
 ]
 
