@@ -270,8 +270,9 @@ class Camera(Train):
         if len(kinds) * len(kinds[0]) > 1 or photodiodes != (1, 1):
             if plan is not None:
                 raise InputError(
-                    "a plan is for one image, and this sensor's pixels have several photodiodes or angular responses: "
-                    "leave it out, or use camera.photodiode(row, column) or camera.pixel_kind(row, column)"
+                    "a plan is for one image, and this sensor's pixels have several photodiodes or angular "
+                    "responses: leave it out, or use camera.photodiode(row, column) or camera.pixel_kind(row, "
+                    "column)"
                 )
             return self._of_parts(light_field, chosen, executor, progress)
         cautions = Cautions(self, light_field.grid)

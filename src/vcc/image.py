@@ -289,11 +289,13 @@ def interleaved(kinds: Sequence[Sequence[Image]], camera: Train | CameraMark | N
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotodiodeImage(Image):
-    """The image of pixels with several photodiodes: the ordinary image, their sum, and the image of each photodiode.
+    """The image of pixels with several photodiodes: the ordinary image, their sum, and the image of each
+    photodiode.
 
-    ``image.photodiodes[row][column]`` is an `Image` as the sensor of `vcc.Sensor.photodiodes` defines it: column 0 lies on the
-    left of the pixel, at smaller x, and records light from the right half of the exit pupil. `upright` turns images and
-    order, so that column 0 stays the one on the left. Slices, factors and divisors apply to each photodiode.
+    ``image.photodiodes[row][column]`` is an `Image` as the sensor of `vcc.Sensor.photodiodes` defines it: column 0
+    lies on the left of the pixel, at smaller x, and records light from the right half of the exit pupil. `upright`
+    turns images and order, so that column 0 stays the one on the left. Slices, factors and divisors apply to each
+    photodiode.
 
     Args:
         photodiodes: images of one frame, rows of columns.

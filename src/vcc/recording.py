@@ -163,8 +163,8 @@ class PhotodiodeRecording(Recording):
     """The recording of pixels with several photodiodes: the sum of their numbers, and the recording of each.
 
     ``recording.photodiodes[row][column]`` is a `Recording` with noise of its own, in the order of
-    `vcc.image.PhotodiodeImage`. The sum is a recording, too: of electronics whose full well, black level, dark current and
-    noise are those of all photodiodes together (`vcc.Electronics.binned`).
+    `vcc.image.PhotodiodeImage`. The sum is a recording, too: of electronics whose full well, black level, dark
+    current and noise are those of all photodiodes together (`vcc.Electronics.binned`).
 
     Args:
         photodiodes: one exposure, rows of columns.

@@ -153,8 +153,8 @@ def test_photodiodes_add_up_to_the_ordinary_image(method):
     light_field = textured_field()
     for elements, allowed in (
         ([LENS], 1e-6),
-        # By footprints, masks in mid-path are taken where a photodiode's part of a view's cell meets them, which is
-        # more accurate than where its middle does: the ordinary image itself is right to a few thousandths.
+        # By footprints, masks in mid-path are taken where a photodiode's part of a view's cell meets them, which
+        # is more accurate than where its middle does: the ordinary image itself is right to a few thousandths.
         ([LENS, vcc.Mask(patterns.mura(7), width=6 * mm, z=25 * mm)], 1e-6 if method == "rays" else 3e-3),
         ([LENS, vcc.LensArray(2 * mm, 20 * mm, z=40 * mm)], 1e-6),
     ):

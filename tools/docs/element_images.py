@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 import vcc
 from vcc.files.pictures import auto_exposure
 from vcc.files.transfer import encode
-from vcc.plot import style
+from vcc.plot import plot_element, style
 from vcc.plot.tracing import trace
 from vcc.prescriptions.model import Prescription, Surface
 from vcc.showcase.scene import FAR, MIDDLE, NEAR, Chart, Foliage, demo_scene
@@ -194,6 +194,45 @@ def mask() -> tuple[Figure, Figure]:
     heterodyne = shown(camera(MIDDLE, cosine).capture(light_field()))
     picture(late, heterodyne, "cosine mask near the sensor", FIELD / PIXELS * focused(MIDDLE))
     return figure, small_picture(pictures[1][6:106, 6:106])
+
+
+def angle_filter() -> tuple[Figure, Figure]:
+    """A louvre from the side, transmissions against the angle, and an image through a louvre and through a "
+    "filter."""
+    louvre = vcc.Louvre(pitch=0.5 * mm, height=1.6 * mm, wall=0.05 * mm, z=46 * mm)
+    fringes = vcc.AngleFilter(vcc.patterns.AngularFringes(frequency=60), z=46 * mm)
+    figure = panels.new_figure(11, 3.0)
+    side, curve, through, striped = figure.subplots(1, 4, width_ratios=(1, 1, 1.1, 1.1))
+    plot_element(louvre, axes=side)
+    angles = np.radians(np.linspace(-20, 20, 401))
+    rays = np.zeros((2000, 4))
+    rays[:, 0] = (np.arange(2000) + 0.5) / 2000 * louvre.pitch
+    for element, name, colour in ((louvre, "louvre", style.BLUE), (fringes, "fringes, β = 60", style.ORANGE)):
+        (term,) = element.faces().terms
+        shares = []
+        for angle in angles:
+            rays[:, 2] = np.tan(angle)
+            shares.append(term.share(rays).mean())
+        curve.plot(np.degrees(angles), shares, color=colour, lw=1.4, label=name)
+    curve.legend(fontsize=style.SMALL, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 0.98), ncols=2)
+    style.tidy(curve, "angle of incidence [°]", "mean transmission")
+    curve.set_ylim(0, 1.05)
+    narrow = 4 * mm  # of the lens: at wide ones a pixel averages over many angles
+    white = auto_exposure(camera(MIDDLE, diameter=narrow).capture(light_field()).to_numpy())
+    pitch = FIELD / PIXELS * focused(MIDDLE)
+    pictures = [
+        shown(camera(MIDDLE, element, diameter=narrow).capture(light_field(), samples=rays), white)
+        for element, rays in ((louvre, 256), (fringes, None))
+    ]
+    picture(through, pictures[0], "through the louvre", pitch)
+    picture(striped, pictures[1], "through the fringes", pitch)
+    small, axes = small_axes()
+    for height in (0.1, 0.36, 0.62, 0.88):
+        axes.plot([0.35, 0.65], [height, height], color="black", lw=2.5)
+    for height, slope, end in ((0.23, 0.0, 1.0), (0.49, 0.12, 1.0), (0.62, -0.7, 0.55), (0.95, -0.9, 0.44)):
+        axes.plot([0, end], [height - slope * 0.5, height + slope * (end - 0.5)], color=style.BLUE, lw=1.5)
+    axes.set(xlim=(0, 1), ylim=(0, 1))
+    return figure, small
 
 
 def lamps_light_field() -> vcc.LightField:
@@ -617,6 +656,7 @@ DRAWINGS: dict[str, Callable[[], tuple[Figure, Figure]]] = {
     "lens": lens,
     "prism": prism,
     "mask": mask,
+    "angle-filter": angle_filter,
     "diffuser": diffuser,
     "phase-plate": phase_plate,
     "lens-array": lens_array,

@@ -112,8 +112,8 @@ def _by_direction(train: Train) -> list[str]:
     rows, columns = train.sensor.photodiodes
     if rows * columns > 1:
         notes.append(
-            f"this is the plan of whole pixels; a capture makes an image for each of their {rows}×{columns} photodiodes, "
-            f"whose microlenses image {train.chief_rays().of} onto them"
+            f"this is the plan of whole pixels; a capture makes an image for each of their {rows}×{columns} "
+            f"photodiodes, whose microlenses image {train.chief_rays().of} onto them"
         )
     return notes
 

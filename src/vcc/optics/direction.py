@@ -23,8 +23,10 @@ Array = NDArray[np.float64]
 class AngleFilter(Element):
     """A filter that transmits by direction: the pattern of a mask, as a function of slopes in place of positions.
 
-    A length of 1 m in the pattern is a slope of 1. So ``AngleFilter(patterns.Circle(2 * math.tan(angle)))`` is a stop at
-    infinity: it passes light within ``angle`` of the axis. The filter acts on the arriving ray, before its neighbours in
+    A length of 1 m in the pattern is a slope of 1. So ``AngleFilter(patterns.Circle(2 * math.tan(angle)))`` is a
+    stop at
+    infinity: it passes light within ``angle`` of the axis. The filter acts on the arriving ray, before its
+        neighbours in
     the same plane bend light.
 
     Args:
@@ -59,8 +61,8 @@ class AngleFilter(Element):
 class Louvre(Element):
     """Opaque parallel walls across the element's plane, as in a privacy film: each gap passes light near its axis.
 
-    A ray passes if it enters and leaves through the same gap. Across the walls, with gaps of width g = pitch − wall, the
-    mean transmission over all places is max(0, g − height·|s|)/pitch.
+    A ray passes if it enters and leaves through the same gap. Across the walls, with gaps of width g = pitch −
+    wall, the mean transmission over all places is max(0, g − height·|s|)/pitch.
 
     The walls begin at z and end at z + height. Other elements may stand there: the louvre counts as thin.
 
@@ -85,8 +87,8 @@ class Louvre(Element):
         checks.finite(f"rotation of {self.label}", self.rotation, "radians")
         if not 0 <= checks.finite(f"wall of {self.label}", self.wall, "metres") < self.pitch:
             raise InputError(
-                f"wall of {self.label} is {self.wall * 1e3:g} mm: walls are 0 or thicker, and thinner than the pitch of "
-                f"{self.pitch * 1e3:g} mm"
+                f"wall of {self.label} is {self.wall * 1e3:g} mm: walls are 0 or thicker, and thinner than the "
+                f"pitch of {self.pitch * 1e3:g} mm"
             )
 
     def faces(self) -> Faces:

@@ -190,8 +190,8 @@ class Electronics(Shown):
         bits = self.bit_depth + math.ceil(math.log2(count))
         if bits > 16:
             raise InputError(
-                f"the sum of {count} photodiodes of {self.bit_depth} bits needs {bits} bits, and 16 are the most: give the "
-                f"electronics a bit_depth of {self.bit_depth - bits + 16} or less"
+                f"the sum of {count} photodiodes of {self.bit_depth} bits needs {bits} bits, and 16 are the "
+                f"most: give the electronics a bit_depth of {self.bit_depth - bits + 16} or less"
             )
         return replace(
             self,

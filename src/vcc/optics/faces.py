@@ -1,8 +1,8 @@
-"""The effect of a thin element in the form that a camera needs: faces, which are functions of position only.
+"""The effect of a thin element in the form that a camera needs: faces, functions of the ray.
 
 The paper's three categories of optics (section 3.2) are three faces of an element: a linear transform is a
-deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection and
-a scatter kernel depend on the place of a ray; a transmission may also depend on the ray's slopes (`Term`).
+deflection (Δs, Δt) of each ray, a dot product is a transmission, a convolution is a scatter kernel. A deflection
+and a scatter kernel depend on the place of a ray; a transmission may also depend on the ray's slopes (`Term`).
 """
 
 from __future__ import annotations

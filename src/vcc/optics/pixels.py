@@ -1,9 +1,10 @@
 """Pixels that depend on the direction of light: photodiodes under a microlens, and an angular response.
 
-The microlens of a pixel images the exit pupil onto the pixel's photodiodes, which lie in its focal plane at the depth h. A ray
-that arrives at x with the slope s meets that plane at q = h·(s − s₀(x)) from the pixel's middle, where s₀(x) is the slope of
-the chief ray, which comes from the middle of the exit pupil. So the left photodiode (smaller x) records light from the right
-half of the exit pupil. Each photodiode is a term of the transmission at the sensor; the terms of a pixel sum to one.
+The microlens of a pixel images the exit pupil onto the pixel's photodiodes, which lie in its focal plane at the
+depth h. A ray that arrives at x with the slope s meets that plane at q = h·(s − s₀(x)) from the pixel's middle,
+where s₀(x) is the slope of the chief ray, which comes from the middle of the exit pupil. So the left photodiode
+(smaller x) records light from the right half of the exit pupil. Each photodiode is a term of the transmission at
+the sensor; the terms of a pixel sum to one.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class Microlens:
     Args:
         height: h, of the microlens above the photodiodes, which lie at its focus, metres.
         f_number: h over the pixel's pitch (the horizontal one), in place of ``height``.
-        pupil_distance: from the sensor back to the exit pupil that the microlenses are shifted for, metres; infinite for
-            no shift. None: the exit pupil of the camera's stop.
+        pupil_distance: from the sensor back to the exit pupil that the microlenses are shifted for, metres;
+            infinite for no shift. None: the exit pupil of the camera's stop.
         crosstalk: width of the ramp at the edge between photodiodes, metres in their plane; 0 for sharp edges.
 
     Raises:

@@ -32,15 +32,16 @@ class Sensor(Shown):
             pixel's proportions in its middle. A smaller area collects less light, and samples more sharply.
         electronics: conversion of light into numbers, for `vcc.Camera.expose`; None if only irradiance
             is needed. For a sensor with photodiodes, that of one photodiode.
-        photodiodes: (rows, columns) in each pixel, under its microlens: (1, 2) for dual pixels, (2, 2) for quad pixels.
+        photodiodes: (rows, columns) in each pixel, under its microlens: (1, 2) for dual pixels, (2, 2) for quad
+            pixels.
         microlens: over the photodiodes of each pixel; None: one that images the exit pupil of the camera's stop.
-        angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`, in
-            which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are a tile
-            that repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
+        angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`,
+            in which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are
+            a tile that repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
 
     Raises:
-        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor outside
-            its range, fewer than one photodiode, or a microlens without photodiodes.
+        InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor
+            outside its range, fewer than one photodiode, or a microlens without photodiodes.
     """
 
     z: float = field(metadata={"unit": "length"})
@@ -96,7 +97,8 @@ class Sensor(Shown):
 
     @property
     def pixel_kinds(self) -> tuple[tuple[Pattern | None, ...], ...]:
-        """The angular responses of the tile that repeats over the sensor, rows of columns; one of all pixels alike."""
+        """The angular responses of the tile that repeats over the sensor, rows of columns; one of all pixels "
+        "alike."""
         response = self.angular_response
         if isinstance(response, tuple):
             return response

@@ -1,7 +1,9 @@
-"""Transmission by direction: patterns of affine functions of the ray, and how each becomes a mask at another plane.
+"""Transmission by direction: patterns of affine functions of the ray, and how each becomes a mask at another
+plane.
 
-A transmission is a product of terms g(A·(x, y, s, t)). Completed to an invertible map of rays, A leads to a plane in which
-the term is an ordinary mask, and its inverse leads back. So plans, gradients and drawings treat a term as a mask.
+A transmission is a product of terms g(A·(x, y, s, t)). Completed to an invertible map of rays, A leads to a plane
+in which the term is an ordinary mask, and its inverse leads back. So plans, gradients and drawings treat a term as
+a mask.
 """
 
 from __future__ import annotations
@@ -33,9 +35,10 @@ class Term(Value):
     """One factor of a transmission: a pattern of two numbers that are affine in the arriving ray.
 
     Args:
-        pattern: transmission as a function of the two numbers: a `vcc.patterns.Pattern`, or a function of two arrays.
-        of: A, 2×4, or 2×5 with an offset: the two numbers are A·(x, y, s, t[, 1]), with x, y in metres from the element's
-            middle and slopes s, t.
+        pattern: transmission as a function of the two numbers: a `vcc.patterns.Pattern`, or a function of two
+            arrays.
+        of: A, 2×4, or 2×5 with an offset: the two numbers are A·(x, y, s, t[, 1]), with x, y in metres from the
+            element's middle and slopes s, t.
 
     Raises:
         InputError: another shape, numbers that are not finite, or rows that depend on each other.
@@ -52,7 +55,8 @@ class Term(Value):
             given = np.zeros(0)
         if given.shape not in ((2, 4), (2, 5)):
             raise InputError(
-                "a term's `of` is a 2×4 array A (or 2×5 with an offset): its pattern is a function of A·(x, y, s, t)"
+                "a term's `of` is a 2×4 array A (or 2×5 with an offset): its pattern is a function of A·(x, y, "
+                "s, t)"
             )
         checks.all_finite("a term's `of`", given)
         matrix = np.zeros((2, 5))
@@ -70,7 +74,8 @@ class Term(Value):
 
     @classmethod
     def behind(cls, pattern: Pattern | Callable[[Array, Array], ArrayLike], distance: float) -> Term:
-        """A pattern at which rays arrive ``distance`` metres behind the element: (x + distance·s, y + distance·t)."""
+        """A pattern at which rays arrive ``distance`` metres behind the element: (x + distance·s, y + "
+        "distance·t)."""
         return cls(pattern, ((1, 0, distance, 0), (0, 1, 0, distance)))
 
     def share(self, rays: Array) -> Array:
@@ -81,7 +86,8 @@ class Term(Value):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """The largest slopes (s, t) that light through the element's middle can have to pass; infinite if unbounded."""
+        """The largest slopes (s, t) that light through the element's middle can have to pass; infinite if "
+        "unbounded."""
         by_slope = np.asarray(self.of)[:, 2:4]
         half = np.array(self.pattern.size) / 2  # type: ignore[union-attr]
         bounds = np.full((2, 2), np.inf)
@@ -92,7 +98,8 @@ class Term(Value):
     @property
     @cached
     def to_plane(self) -> Affine:
-        """The map of rays, about the element's middle, to a plane whose places (x, y) are the pattern's numbers."""
+        """The map of rays, about the element's middle, to a plane whose places (x, y) are the pattern's "
+        "numbers."""
         matrix = np.asarray(self.of)
         pairs = list(itertools.combinations(range(4), 2))
         size = np.abs(matrix[:, :4]).max(axis=1, keepdims=True)
@@ -105,8 +112,9 @@ class Term(Value):
     def mixes(self) -> bool:
         """Whether the two numbers see place and slope along different axes, as (x, h·s) does.
 
-        A mask at some distance sees x and s by its first number, y and t by its second, perhaps rotated: footprints of samples
-        are rectangles or parallelograms in its plane. Otherwise they can be lines, and rays are traced.
+        A mask at some distance sees x and s by its first number, y and t by its second, perhaps rotated:
+        footprints of samples are rectangles or parallelograms in its plane. Otherwise they can be lines, and rays
+        are traced.
         """
         parts = [np.asarray(self.of)[:, :2], np.asarray(self.of)[:, 2:4]]
         if not any(part[[0, 1], [1, 0]].any() for part in parts):

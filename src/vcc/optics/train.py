@@ -28,7 +28,6 @@ from vcc.optics.sensor import Sensor
 from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
 
-
 RESPONSE = "response of the pixels"
 """Name of the sensor's angular response among the stages of a train."""
 
@@ -269,14 +268,15 @@ class Train(Value, Shown):
             column: 0 for the left one (smaller x), which records light from the right half of the exit pupil.
 
         Raises:
-            InputError: no such photodiode, no stop whose exit pupil the microlenses are shifted for, or a microlens
-                without the height that its photodiodes need.
+            InputError: no such photodiode, no stop whose exit pupil the microlenses are shifted for, or a
+                microlens without the height that its photodiodes need.
         """
         sensor = self.sensor
         rows, columns = sensor.photodiodes
         if not (0 <= row < rows and 0 <= column < columns):
             raise InputError(
-                f"there is no photodiode ({row}, {column}): the sensor has {rows}×{columns} (rows, columns) in a pixel"
+                f"there is no photodiode ({row}, {column}): the sensor has {rows}×{columns} (rows, columns) in a "
+                "pixel"
             )
         microlens = sensor.microlens or Microlens()
         term = photodiode_term(sensor.photodiodes, (row, column), sensor.pitches, microlens, self.chief_rays())
@@ -306,7 +306,8 @@ class Train(Value, Shown):
     def chief_rays(self) -> SlopesOfChief:
         """The rays from the middle of the exit pupil: that of the sensor's microlens, or of the camera's stop.
 
-        The stop is the opening of known size that lets the smallest range of slopes through to a place on the sensor.
+        The stop is the opening of known size that lets the smallest range of slopes through to a place on the
+        sensor.
 
         Raises:
             InputError: neither is known.
@@ -334,8 +335,8 @@ class Train(Value, Shown):
                     best = bound, SlopesOfChief.from_stop(stop_from_sensor, middle, stage.element.label)
         if best is None:
             raise InputError(
-                "photodiodes need an exit pupil, and no stop of known size lies before the sensor (behind plates and "
-                "arrays): give the lens a diameter, or Sensor(microlens=vcc.Microlens(pupil_distance=…))"
+                "photodiodes need an exit pupil, and no stop of known size lies before the sensor (behind plates "
+                "and arrays): give the lens a diameter, or Sensor(microlens=vcc.Microlens(pupil_distance=…))"
             )
         return best[1]
 

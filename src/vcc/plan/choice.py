@@ -141,8 +141,9 @@ class _Making:
         kinds = train.sensor.pixel_kinds
         if len(kinds) * len(kinds[0]) > 1:
             raise InputError(
-                f"a plan is for pixels that respond alike, and this sensor repeats a tile of {len(kinds)}×{len(kinds[0])} "
-                "angular responses: capture it, or plan camera.pixel_kind(row, column)"
+                "a plan is for pixels that respond alike, and this sensor repeats a tile of "
+                f"{len(kinds)}×{len(kinds[0])} angular responses: capture it, or plan camera.pixel_kind(row, "
+                "column)"
             )
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts

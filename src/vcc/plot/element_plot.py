@@ -91,7 +91,8 @@ def _part(element: Element, axis: int) -> tuple[float, int]:
 
 
 def _slopes(element: Element, axis: int) -> tuple[float, ...]:
-    """Slopes of the light that is drawn: 0, and of an element that filters directions, two that pass less or not."""
+    """Slopes of the light that is drawn: 0, and of an element that filters directions, two that pass less or "
+    "not."""
     terms = [term for part in element.parts() if isinstance(part, Faces) for term in part.terms]
     if not terms:
         return (0.0,)

@@ -387,7 +387,8 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
 
 
 def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
-    """What has neither a known shape nor a transmission by position: a thin sheet, dotted if it filters directions."""
+    """What has neither a known shape nor a transmission by position: a thin sheet, dotted if it filters "
+    "directions."""
     middle = (pen.low + pen.high) / 2
     ends = middle + 1.02 * pen.half * np.array([-1, 1])
     looks: dict[str, Any] = {"dashes": (1, 1)} if by_direction else {}
@@ -395,7 +396,8 @@ def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
 
 
 def _draw_louvre(pen: Pen, louvre: Louvre) -> None:
-    """Its walls, where the drawing's plane cuts them; a dotted sheet if it runs along them or they are too many."""
+    """Its walls, where the drawing's plane cuts them; a dotted sheet if it runs along them or they are too "
+    "many."""
     across = math.cos(louvre.rotation) if pen.axis == 0 else math.sin(louvre.rotation)
     pitch = louvre.pitch / max(abs(across), 1e-9)
     if 2 * pen.half / pitch > MOST_WALLS:

@@ -121,8 +121,8 @@ class Exposure:
         photodiode: number of the photodiode of each pixel whose noise is drawn.
 
     Raises:
-        InputError: a sensor without electronics, an unusable time, seed or radiance, or photodiodes whose sum needs
-            more than 16 bits.
+        InputError: a sensor without electronics, an unusable time, seed or radiance, or photodiodes whose sum
+            needs more than 16 bits.
     """
 
     sensor: Sensor

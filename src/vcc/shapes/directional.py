@@ -20,10 +20,11 @@ MANY_GAPS = 16
 
 @dataclass(frozen=True)
 class AngularFringes(Pattern):
-    """The response of an angle-sensitive pixel: ½·(1 + m·cos(β·θ + α)), θ the angle of incidence along one direction.
+    """The response of an angle-sensitive pixel: ½·(1 + m·cos(β·θ + α)), θ the angle of incidence along one
+    direction.
 
-    A pattern of slopes, for `vcc.AngleFilter`: θ = atan(s·cos ρ + t·sin ρ) for the rotation ρ. Two stacked gratings
-    (Wang, Gill and Molnar 2009, eq. 1) respond so.
+    A pattern of slopes, for `vcc.AngleFilter`: θ = atan(s·cos ρ + t·sin ρ) for the rotation ρ. Two stacked
+    gratings (Wang, Gill and Molnar 2009, eq. 1) respond so.
 
     Args:
         frequency: β, periods of 2π per radian.

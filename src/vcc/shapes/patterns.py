@@ -608,9 +608,9 @@ def _check_two_arguments(function: Callable[..., Any]) -> None:
         signature.bind(0.0, 0.0)
     except TypeError:
         raise InputError(
-            f"a pattern is a function of two numbers, (x, y), and this one has the arguments {signature}. A transmission "
-            "that depends on direction, too, is a product of vcc.Term objects, each a function of two numbers that are "
-            "affine in (x, y, s, t): vcc.Faces(terms=(vcc.Term.of_slopes(function),))"
+            f"a pattern is a function of two numbers, (x, y), and this one has the arguments {signature}. A "
+            "transmission that depends on direction, too, is a product of vcc.Term objects, each a function of "
+            "two numbers that are affine in (x, y, s, t): vcc.Faces(terms=(vcc.Term.of_slopes(function),))"
         ) from None
 
 

@@ -240,7 +240,7 @@ class InMemory(Results):
         if not np.may_share_memory(values, self.swept.pictures):  # otherwise it was made in place
             self.swept.pictures[place] = values
 
-    def room(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
+    def output_buffers(self, numbers: Sequence[int]) -> NDArray[np.float32] | None:
         """See `Results`."""
         pictures = self.swept.pictures
         first, count = numbers[0], len(numbers)
