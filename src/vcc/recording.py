@@ -243,7 +243,7 @@ def _recorded_by_photodiodes(image: PhotodiodeImage, exposure: Exposure) -> Phot
     ]
     listed = [each for row in parts for each in row]
     electronics = listed[0].electronics.binned(len(listed))
-    total = np.sum([each.values for each in listed], axis=0, dtype=np.uint32)
+    total = np.stack([each.values for each in listed]).sum(axis=0, dtype=np.uint32)
     return PhotodiodeRecording(
         total.astype(np.uint8 if electronics.bit_depth <= 8 else np.uint16),
         replace(plain.sensor, electronics=electronics),

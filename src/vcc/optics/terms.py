@@ -82,7 +82,7 @@ class Term(Value):
         """The share of light that passes, of rays (..., 4) about the element's middle."""
         matrix = np.asarray(self.of)
         seen = rays @ matrix[:, :4].T + matrix[:, 4]
-        return np.asarray(self.pattern(seen[..., 0], seen[..., 1]), dtype=np.float64)  # type: ignore[operator]
+        return np.asarray(self.pattern(seen[..., 0], seen[..., 1]), dtype=np.float64)
 
     @property
     def steepest(self) -> tuple[float, float]:
