@@ -61,7 +61,6 @@ class CameraFunction:
             not affect images, are learned with PyTorch.
         how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose images are float64
             if JAX supports it.
-            where JAX has it.
         options: as in `vcc.Camera.capture`.
 
     Raises:
