@@ -203,8 +203,7 @@ def _slopes_at_lenslet(arriving: Affine) -> Array:
 
 
 def _airy(optics: Folded, wavelength: float) -> Items:
-    """Airy item: a slope change λ/width at the entrance moves light on the sensor by B times that, at any
-    focus."""
+    """Airy item: a slope change λ/width at the entrance moves light on the sensor by B times that."""
     half, lever = optics.half_width, stretch(optics.sensor_from_slope)
     if half is None or lever <= ROUNDING * half:
         return {}

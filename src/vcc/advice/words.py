@@ -224,8 +224,7 @@ def fresnel_blur(label: str, blur: float, detail: float, nearer: float) -> Sampl
 
 
 def hole_diffraction(label: str, spread: float, picture: float) -> SamplingItem:
-    """Diffraction by a hole of a mask in the aperture, and the hole's size in the image of the most blurred
-    point."""
+    """Diffraction by a hole of a mask in the aperture, and the hole's size in the most blurred image."""
     return _item(
         f"diffraction λ·d/a by the holes of {label}",
         spread,
