@@ -1,4 +1,4 @@
-"""One element from the side, and what it does to parallel light."""
+"""Draw one element from the side, with parallel light through it."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 UNBOUNDED = 10 * mm
-"""Half the height of what is drawn of an element without a rim."""
+"""Half the drawn height of an element without a rim, metres."""
 CELLS = 5
-"""Of an array, so many are drawn, and of its light what goes through them."""
+"""Number of cells of an array that are drawn; only light through these is drawn."""
 RAYS, RAYS_THAT_SPLIT, RAYS_A_CELL = 9, 5, 5
 ROOM_BEHIND = (1.5, 60.0)
-"""Bounds of how far rays are followed behind the element, in half heights of what is drawn."""
+"""Bounds for the length of the rays behind the element, in half heights of the drawing."""
 
 
 def plot_element(element: Element, *, across: str = "x", axes: Axes | None = None) -> Axes:
-    """Draw an element from the side, and parallel light that goes through it to the right.
+    """Draw an element from the side, with parallel light through it to the right.
 
-    Of an element without a rim a piece 20 mm high is drawn, of an array of cells the five in its middle. Rays are
-    followed for about as far as the element brings them to a point or apart; z counts from the element.
+    Of an element without a rim, a part 20 mm high is drawn, of an array the five central cells. Rays continue
+    about as far as the element needs to focus or separate them; z starts at the element.
 
     Args:
-        element: what to draw, wherever it stands.
+        element: what to draw; its position is ignored.
         across: ``"x"`` or ``"y"``, the axis drawn upwards in the figure (y points down).
         axes: where to draw; None makes a new figure.
 
@@ -45,7 +45,7 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: another axis, or an element that returns what it must not.
+        InputError: an invalid axis, or an element with an invalid result.
     """
     checks.one_of("across", across, "xy")
     axis = "xy".index(across)
@@ -69,7 +69,7 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
 
 
 def _part(element: Element, axis: int) -> tuple[float, int]:
-    """Half the height of what is drawn, metres, and how many rays."""
+    """Half the drawn height, metres, and the number of rays."""
     half = half_size(element, axis)
     faces = [part for part in element.parts() if isinstance(part, Faces)]
     cells = next((part.bending for part in faces if isinstance(part.bending, CellDeflection)), None)
@@ -80,7 +80,7 @@ def _part(element: Element, axis: int) -> tuple[float, int]:
 
 
 def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Paths:
-    """Rays through the element and on, for as far as their change of slope takes to show."""
+    """Rays through the element and behind it, until their change of slope is visible."""
 
     def through(room: float) -> Paths:
         sensor = Sensor(z=element.length + room, shape=(1, 1), pitch=1.0)
@@ -89,7 +89,7 @@ def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Pat
     one = through(half)
     slopes = np.diff(one.positions[..., axis][:, -2:], axis=1)[:, 0] / half
     steepest = float(np.abs(slopes[one.shares[:, -1] > 0]).max(initial=0.0))
-    height = half / CELLS if len(bundle) == RAYS_A_CELL * CELLS else half  # cells are brought to points one by one
+    height = half / CELLS if len(bundle) == RAYS_A_CELL * CELLS else half  # each cell has its own focus
     wanted = 1.3 * height / steepest if steepest > 0 else 2 * half
     nearest, farthest = (bound * height for bound in ROOM_BEHIND)
     return through(min(max(wanted, nearest), farthest))
