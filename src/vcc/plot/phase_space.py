@@ -135,7 +135,7 @@ def plot_phase_space_stages(
     slope; the light that it scatters out of the slice is assumed to be replaced by neighbouring slices.
 
     Args:
-        camera: for the light field.
+        camera: the camera.
         light_field: at the entrance plane.
         row: as in `plot_phase_space`, also the next three.
         pixel_row: which row of pixels.
@@ -152,7 +152,7 @@ def plot_phase_space_stages(
     titles = [(-1.0, ENTRANCE), *_planes(camera)]
     cells: dict[float, InMemory] = {}
     if _held_by_samples(chosen, row, pixel_row, fixed):
-        piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first, so that later steps have few samples
+        piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first: fewer samples for later steps
         cells = {
             z: piece if z < 0 else carried_to(camera, piece, z) for z, _ in titles if z < _traced_from(camera)
         }
@@ -200,7 +200,7 @@ def phase_space_stages(
     """The data of `plot_phase_space_stages`: rasters of radiance at each plane, from traced rays.
 
     Args:
-        camera: for the light field; the other arguments as in `plot_phase_space_stages`.
+        camera: the camera; the other arguments as in `plot_phase_space_stages`.
         rays: approximate number of traced rays, 1 or more.
 
     Raises:
@@ -225,7 +225,7 @@ def phase_space_at(
     """A raster of radiance, as from `phase_space_stages`, at any plane of the axis.
 
     Args:
-        camera: for the light field.
+        camera: the camera.
         light_field: at the entrance plane.
         z: of the plane, metres, up to the sensor's; negative before the camera. If an element is there, the
             plane is just behind it.
