@@ -47,8 +47,8 @@ def _check_of_the_run(options: Options) -> None:
     for name in options:
         if name not in OF_THE_RUN:
             raise InputError(
-                f"{name} is decided when a plan is made: leave it out, or pass it to camera.compile, and that "
-                "plan here"
+                f"{name} is fixed when a plan is made: leave it out, or pass it to camera.compile and pass "
+                "that plan here"
             )
 
 

@@ -281,7 +281,7 @@ def load_image(path: str | PathLike[str]) -> Image:
         )
     if said.frame is None:
         raise InputError(
-            f"{stated.path} does not say how large its pixels are, as a view of a folder does not: open the "
+            f"{stated.path} does not contain the size of its pixels; it may be a view of a light field: open the "
             "folder with vcc.open_light_field"
         )
     if said.clipped and said.recording is None:

@@ -82,9 +82,7 @@ class Recording(RawPicture, Shown):
         """
         electronics = self.electronics
         if electronics.color_filter is None:
-            raise InputError(
-                "there is no colour filter to demosaic: every pixel recorded all that there is. Use image()"
-            )
+            raise InputError("the sensor has no colour filter, so that there is nothing to demosaic: use image()")
         values = demosaic(self.irradiance(), electronics, method)
         return Image(values, self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
@@ -200,7 +198,7 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
         exposure: the settings of the recording.
     """
     if not image.inverted:
-        raise InputError("a sensor records the picture as it lies on it: give the one that is not upright")
+        raise InputError("the image is upright, but a sensor records the inverted one: pass the image as captured")
     light = image.to_numpy()
     raw = exposure.recorded(light, image.missing_rays)
     caution = below_zero(light)
@@ -224,7 +222,7 @@ def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
     stated = read_with_metadata(path)
     said = stated.metadata
     if said is None or said.recording is None:
-        is_none = unknown(stated) if said is None else f"{path} says that its numbers are {said.in_words}"
+        is_none = unknown(stated) if said is None else f"{path} contains {said.in_words}"
         raise InputError(
             f"{is_none}, not those of a recording: vcc.load_image reads pictures, and vcc.Recording takes "
             "numbers, a sensor and an exposure time"
@@ -243,7 +241,7 @@ def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
     wrong = numbers.unlike(own)
     if wrong is not None:
         raise InputError(
-            f"{path} says that {wrong} is {getattr(numbers, wrong)}, and with this sensor it is "
-            f"{getattr(own, wrong)}: give the one that recorded it"
+            f"{wrong} is {getattr(numbers, wrong)} in {path}, but {getattr(own, wrong)} for this sensor: "
+            "pass the sensor that recorded it"
         )
     return found
