@@ -126,8 +126,8 @@ def optimised_aperture(
 
 def _ended(converged: bool, done: int, waited: int) -> str:
     if converged:
-        return f"converged: {waited} generations brought nothing better; {done} bred"
-    vain = f", the last {waited} of which brought nothing better" if waited else ""
+        return f"converged: {waited} generations without improvement; {done} in all"
+    vain = f", the last {waited} of them without improvement" if waited else ""
     return f"stopped after all {done} generations{vain}"
 
 
@@ -202,5 +202,5 @@ def _check_search(
     checks.whole_number_between("survivors", survivors, 2, way_out="fewer cannot breed")
     if int(population) != population or population <= survivors:
         raise InputError(
-            f"a population of {population} leaves no place for children of {survivors} survivors: make it larger"
+            f"a population of {population} leaves no children besides {survivors} survivors: make it larger"
         )

@@ -73,7 +73,7 @@ class PointSpread(Shown):
             return
         light = _in_pixels(self.finer.values, self.finer.frame, self.frame, self.shape)
         if not np.allclose(light, self.values, rtol=0, atol=ROUNDING):
-            raise InputError("finer holds other light than values, whose parts it is: replace both, or finer=None")
+            raise InputError("the light in finer differs from values: replace both, or pass finer=None")
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -266,8 +266,8 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
     if lowest < -ROUNDING * largest:
         raise InputError(
             f"this spectrum is that of a light field with negative samples (lowest {lowest:g}, largest "
-            f"{largest:g}), which radiance is not: take the numbers from vcc.analysis.samples_of(spectrum), and "
-            "clip or shift them"
+            f"{largest:g}), but radiance is not negative: use the numbers of vcc.analysis.samples_of(spectrum), "
+            "and clip or shift them"
         )
     return LightField(np.maximum(samples, 0), spectrum.light_field_frame, sample=spectrum.sample)
 
@@ -338,7 +338,7 @@ def _windows(window: Window | Sequence[Window], shape: tuple[int, ...]) -> list[
             # Symmetric, as the samples are symmetric in their grid.
             found.append(np.asarray(get_window(name, size, fftbins=False), dtype=np.float64))
         except (ValueError, TypeError) as error:
-            raise InputError(f"window {name!r} is none of scipy.signal.get_window: {error}") from None
+            raise InputError(f"window {name!r} is unknown to scipy.signal.get_window: {error}") from None
     return found
 
 

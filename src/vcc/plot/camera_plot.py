@@ -87,7 +87,7 @@ def plot_camera(
     if rays is not None:
         checks.whole_number_between("rays", rays, 2)
     if magnified is True and axes is not None:
-        raise InputError("beside axes that are given, a magnified piece needs axes too: pass them as magnified=")
+        raise InputError("with axes=, a magnified inset needs axes as well: pass them as magnified=")
     from matplotlib.lines import Line2D
 
     axis = "xy".index(across)

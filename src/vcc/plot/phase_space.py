@@ -274,7 +274,7 @@ def _sheet(
 
 def _some(rays: int) -> int:
     if not rays >= 1:
-        raise InputError(f"rays is a number from 1 on, not {rays}")
+        raise InputError(f"rays must be 1 or more, not {rays}")
     return rays
 
 
@@ -287,7 +287,7 @@ def _held_by_samples(
     if row is not None or pixel_row is not None:
         names = [NAMES[n] for n in range(4) if n not in chosen]
         raise InputError(
-            "row and pixel_row hold samples for u and s, or v and t, alone: give the coordinates that are held as "
+            "row and pixel_row are supported only for u and s, or v and t: pass the fixed coordinates as "
             f"fixed=({names[0]}, {names[1]})"
         )
     return False
@@ -365,7 +365,7 @@ def _slice(light_field: InMemory, row: int | None, pixel_row: int | None, across
     for (name, count), given in zip(counts.items(), (row, pixel_row), strict=True):
         place = count // 2 if given is None else given
         if not -count <= place < count:
-            raise InputError(f"{name} is {place}, and there are {count} of them, counted from 0")
+            raise InputError(f"{name} is {place}, but there are {count}, counted from 0")
         chosen.append(slice(place % count, place % count + 1))
     if across == "u":
         return light_field[chosen[0], :, chosen[1], :]

@@ -111,7 +111,7 @@ def slice_of(across: str) -> tuple[int, int]:
     names = {"u": "us", "v": "vt"}.get(across, across)
     if not isinstance(names, str) or len(names) != 2 or names[0] == names[1] or set(names) - set(NAMES):  # type: ignore[redundant-expr]
         raise InputError(
-            f'across is "u" or "v", or two of u, v, s and t, such as "uv", that to the right first, not {across!r}'
+            f'across is "u" or "v", or two of u, v, s and t, such as "uv" (horizontal first), not {across!r}'
         )
     return NAMES.index(names[0]), NAMES.index(names[1])
 
@@ -152,7 +152,7 @@ def sheet_of_rays(light_field: InMemory, across: tuple[int, int], fixed: tuple[f
     middle = light_field.frame((counts - 1) / 2)
     held = middle[others] if fixed is None else np.asarray(fixed, dtype=np.float64)
     if held.shape != (2,) or not np.isfinite(held).all():
-        raise InputError(f"fixed is two numbers, {NAMES[others[0]]} and {NAMES[others[1]]}, not {fixed}")
+        raise InputError(f"fixed must be two numbers, {NAMES[others[0]]} and {NAMES[others[1]]}, not {fixed}")
     origin, steps, sizes = middle.copy(), np.zeros((2, 4)), []
     origin[others] = held
     for n, axis in enumerate(across):
