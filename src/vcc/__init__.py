@@ -1,6 +1,6 @@
 """Virtual Computational Camera: simulate what unconventional optics record of a 4-D light field.
 
-Importing this package is cheap: each name is loaded when it is first used.
+Importing this package is fast: each name is loaded on first use.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ _INSTEAD = {
     "stop": "Mask(patterns.Circle(diameter), width=...)",
     "capture": "Camera.capture",
 }
-"""Names that users of other programs try, in lower case, and what to write here."""
+"""Names in lower case that users of other programs may try, with the name to use instead."""
 
 __all__ = [*sorted(_HOMES), *sorted(_MODULES)]
 

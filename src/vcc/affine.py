@@ -1,4 +1,4 @@
-"""Affine maps of rays and of sample indices, as users import them: the whole of linear optics, and every frame."""
+"""Affine maps of rays and of sample indices, for users: linear optics, and frames."""
 
 from vcc.base.affine import (
     Affine,

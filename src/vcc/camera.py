@@ -1,4 +1,4 @@
-"""The camera that users meet: an optical train, and the verbs that make pictures with it."""
+"""The camera class: an optical train with methods that capture, expose, explain and draw."""
 
 from __future__ import annotations
 
@@ -43,17 +43,17 @@ def _warn_of(cautions: Iterable[str]) -> None:
 
 
 def _check_of_the_run(options: Options) -> None:
-    """Refuse options that decide how a plan is made, where one is given."""
+    """Raise an error for options that are fixed when a plan is made."""
     for name in options:
         if name not in OF_THE_RUN:
             raise InputError(
-                f"{name} is decided when a plan is made: leave it out, or pass it to camera.compile, and that "
-                "plan here"
+                f"{name} is fixed when a plan is made: leave it out, or pass it to camera.compile and pass "
+                "that plan here"
             )
 
 
 def _place_of(name: str, elements: Sequence[Element]) -> int:
-    """The index of the element of a name, or of a kind."""
+    """The index of the element with a name, or of a kind."""
     called = [element.name or element.kind.replace(" ", "_") for element in elements]
     if called.count(name) == 1:
         return called.index(name)
@@ -64,47 +64,47 @@ def _place_of(name: str, elements: Sequence[Element]) -> int:
 class Camera(Train):
     """Elements along an axis and a sensor behind them.
 
-    A light field given to the camera is taken to lie at the entrance plane, z = 0. Cameras of equal elements and
-    sensors are equal, and can be keys of a cache.
+    A light field given to the camera is at the entrance plane, z = 0. Cameras with equal elements and sensors are
+    equal, and can be keys of a cache.
 
     Args:
-        elements: in any order; kept sorted by z. Elements at the same z commute.
-        sensor: where the picture is recorded; there is no camera without one.
-        name: what pictures say made them, that of the camera's file where there is one; not compared.
+        elements: in any order; sorted by z. The order of elements at the same z does not matter.
+        sensor: records the image; required.
+        name: stored in images as their camera; the name of the camera's file if there is one; not compared.
 
     Raises:
-        InputError: no sensor, or what is no element; an element before the entrance plane or behind the sensor;
-            two elements of one name.
+        InputError: no sensor, an invalid element, an element before the entrance plane or behind the sensor,
+            or two elements with the same name.
     """
 
     @classmethod
     def focused(cls, elements: Iterable[Element], sensor: Sensor, distance: float, *, name: str = "") -> Self:
-        """The camera with its sensor moved to where a point is sharp, by first-order optics.
+        """A camera with its sensor at the plane where a point is sharp, by first-order optics.
 
-        Lenses, first-order systems and quadratic plates count: 1/f = 1/Z + 1/d for one thin lens. Lens arrays,
-        other plates, masks and diffusers do not focus as a lens does, and are passed over.
+        Lenses, first-order systems and quadratic plates count: 1/f = 1/Z + 1/d for one thin lens. Lens
+        arrays, other plates, masks and diffusers are ignored, since they do not focus as a lens does.
 
         Args:
             elements: as for the camera itself.
-            sensor: its z is not looked at (0 will do): it is what is found.
-            distance: Z, from the point to the entrance plane, metres, above 0; ``math.inf`` for a distant scene.
+            sensor: its z is ignored (0 will do) and computed.
+            distance: Z, from the point to the entrance plane, metres, positive; ``math.inf`` for a distant scene.
             name: as for the camera itself.
 
         Raises:
-            InputError: there is no real image of the point, or it lies before the last element; it is sharp along
-                one axis only; or what the camera itself refuses.
+            InputError: no real image of the point, or one before the last element; an image that is sharp
+                along one axis only; or an error of the camera itself.
         """
         train = focused_train(elements, sensor, distance)
         return cls(train.elements, train.sensor, name=name)
 
     def focused_at(self, distance: float) -> Self:
-        """The same camera with its sensor moved to where a point is sharp; see `Camera.focused`.
+        """The same camera with its sensor at the plane where a point is sharp; see `Camera.focused`.
 
         Args:
-            distance: Z, from the point to the entrance plane, metres, above 0; ``math.inf`` for a distant scene.
+            distance: Z, from the point to the entrance plane, metres, positive; ``math.inf`` for a distant scene.
 
         Raises:
-            InputError: as in `Camera.focused`.
+            InputError: as for `Camera.focused`.
         """
         return type(self).focused(self.elements, self.sensor, distance, name=self.name)
 
@@ -124,11 +124,11 @@ class Camera(Train):
             elements: all elements; None keeps them.
             sensor: None keeps it.
             name: None keeps it.
-            by_name: new elements by the name of the element that each replaces; an element without a name is
-                called by its kind, such as ``lens`` or ``lens_array``, if it is the only one of its kind.
+            by_name: new elements by the name of the element to replace; an element without a name has the
+                name of its kind, such as ``lens`` or ``lens_array``, if it is the only one of that kind.
 
         Raises:
-            InputError: no element, or several, of such a name; or as for the camera itself.
+            InputError: no element, or several, with this name; or as for the camera itself.
         """
         listed = list(self.elements if elements is None else elements)
         for wanted, new in by_name.items():
@@ -151,17 +151,19 @@ class Camera(Train):
         electronics: Electronics | None = None,
         name: str = "",
     ) -> Self:
-        """A main lens, lenslets where it images a distance, and the sensor behind them at their focus.
+        """A main lens, lenslets at its image of a given distance, and a sensor behind them at their focus.
 
-        F-numbers match, so that micro-images touch and do not overlap (Ng et al. 2005): with b from lenslets to
-        sensor, d from main lens to lenslets and the pitch p, b = f_number · p and the main lens is
-        D = d·p·(1 + b/d)/b wide. A micro-image is p·(1 + b/d) wide.
+        F-numbers match, so that micro-images touch and do not overlap (Ng et al. 2005): with b from lenslets
+        to sensor, d from main lens to lenslets and the pitch p, b = f_number · p, and the main lens has the
+        diameter D = d·p·(1 + b/d)/b. The width of a micro-image is p·(1 + b/d).
 
-        Two ways give the sensor: ``pixels_per_lenslet`` and ``lenslets``, or ``sensor_size`` and ``pixel_pitch``.
+        Specify the sensor by ``pixels_per_lenslet`` and ``lenslets``, or by ``sensor_size`` and ``pixel_pitch``.
 
-        Decoding counts views from the middle of a micro-image, a pixel apart, and uses no pixel that two
-        micro-images share: n pixels across give 1 + 2·floor((n − 1)/2) views each way. 9 pixels give 9×9 views,
-        4 pixels give 3×3. `vcc.recover.Decoder.of(camera).views` returns their number.
+        Decoding uses views one pixel apart, counted from the middle of a micro-image, and no pixel that two
+        micro-images
+        share: n pixels across give 1 + 2·floor((n − 1)/2) views along each axis. 9 pixels give 9×9 views, 4
+            pixels give
+        3×3. `vcc.recover.Decoder.of(camera).views` returns their number.
 
         Args:
             focal_length: of the main lens, metres.
@@ -169,15 +171,15 @@ class Camera(Train):
             f_number: of the lenslets, b/p, and of the main lens as the sensor sees it, (d + b)/D.
             pixels_per_lenslet: pixels across one micro-image.
             lenslets: (rows, columns): the pixels of a view.
-            sensor_size: (height, width) of the sensor, metres; whole pixels that fit are used.
-            pixel_pitch: metres; micro-images need not be whole numbers of pixels.
+            sensor_size: (height, width) of the sensor, metres; it is filled with whole pixels.
+            pixel_pitch: metres; micro-images need not be whole numbers of pixels wide.
             focus_distance: of the plane that the main lens images on the lenslets, metres; may be infinite.
             electronics: of the sensor.
             name: as for the camera itself.
 
         Raises:
-            InputError: a length or f-number of 0 or less, no whole numbers of pixels and lenslets, a sensor given
-                in neither or in both ways, or a distance within the focal length.
+            InputError: a length or f-number that is not positive, numbers of pixels or lenslets that are not
+                integers, a sensor specified in neither or both ways, or a distance within the focal length.
         """
         design = Plenoptic(
             focal_length,
@@ -199,19 +201,19 @@ class Camera(Train):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Plan:
-        """The plan by which an engine makes the picture; `capture` does this for you.
+        """Make the plan by which an engine computes the image; `capture` does this automatically.
 
         Args:
-            light_field: as in `capture`; its samples are looked at only to measure their disparities.
+            light_field: as in `capture`; its samples are read only to estimate disparities.
             how: as in `capture`.
-            progress: called with (done, total) while disparities are found, where they are needed.
+            progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
         """
         check_is_light_field(light_field)
         light_field.check_complete()
         chosen = How.of(how, options)
         if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
-            light_field.grid.disparities.maps(progress)  # found now, so that progress is seen
+            light_field.grid.disparities.maps(progress)  # now, so that progress is reported
         return compile_best(self, light_field.grid, chosen)
 
     def capture(
@@ -224,44 +226,44 @@ class Camera(Train):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Image:
-        """The picture that the sensor records of a light field.
+        """The image that the sensor records of a light field.
 
         Args:
-            light_field: given at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`) and
-                then read in pieces whose pictures are summed.
-            how: all that may be chosen, in one record; None takes the defaults.
-            plan: made before by `compile` for this light field, or for another of the same shape and frame; None
-                makes one. What decides how it is made is then not to be given one by one.
-            executor: who runs the blocks of a stored light field: any `concurrent.futures.Executor`, or a
-                ``dask.distributed.Client``, which stay open. Each task is one block, with one thread unless
-                ``threads`` says how many and within a ``memory_limit`` of its own. The picture is the same to
-                rounding, and byte for byte from run to run. None runs all here, one block after the other.
-            progress: called with (done, total) as the work advances.
-            options: what is to be chosen otherwise than in ``how``, by name: ``method``, ``interpolation``,
-                ``between_views``, ``scene_distance``, ``refine``, ``samples``, ``tolerance``, ``seed``,
-                ``engine``, ``threads``, ``memory_limit``; `vcc.How` says what each of them is.
+            light_field: at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`). A light
+                field on disk is read in pieces whose images are summed.
+            how: all settings in one record; None uses the defaults.
+            plan: made by `compile` for this light field, or for another of the same shape and frame; None
+                makes one. With a plan, options that it fixes must not be passed.
+            executor: runs the blocks of a stored light field: any `concurrent.futures.Executor`, or a
+                ``dask.distributed.Client``; it stays open. Each task is one block, with one thread unless
+                ``threads`` is set, and with its own ``memory_limit``. The image is the same to rounding, and
+                identical to the byte between runs. None runs all blocks in this process, one after the other.
+            progress: called with (done, total) during the work.
+            options: settings that override ``how``, by name: ``method``, ``interpolation``, ``between_views``,
+                ``scene_distance``, ``refine``, ``samples``, ``tolerance``, ``seed``, ``engine``, ``threads``,
+                ``memory_limit``; `vcc.How` documents each of them.
 
         Returns:
-            Irradiance on the sensor, radiance × steradian (paper, eq. 5), as light lands on it (inverted). Of a
-            sensor with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of
-            each in ``photodiodes[row][column]``.
+            Irradiance on the sensor, radiance × steradian (paper, eq. 5), inverted as on the sensor. For a sensor
+            with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of each in
+            ``photodiodes[row][column]``.
 
         Warns:
-            ResultWarning: more than 1 % of the rays that the camera asks for are not in the light field, the
-                tolerance was not reached, the sampling error of rays exceeds 1 % of the brightest pixel (40 dB)
-                and neither samples nor a tolerance were given (the warning reports how many rays suffice), the
-                cells of an array are smaller than a pixel, the lenses diverge so that no point can be sharp,
-                masks are finer than parts of cells and samples show, images of views stay apart (ghosting), or the
-                picture is 0 everywhere although the light field is not dark (by footprints, and no mask closes the
-                camera). Where the picture is 0, a quarter of the rays or more is missing, or the picture is nearly
-                black, and a length is 1 m or more, a pitch 2 cm or a pixel 1 mm, it asks whether a thousandth was
-                meant.
+            ResultWarning: more than 1 % of the required rays are outside the light field; the tolerance was not
+                reached; the sampling error of rays exceeds 1 % of the brightest pixel (40 dB), and neither
+                samples nor a tolerance were given (the warning reports how many rays suffice); the cells of
+                an array are smaller than a pixel; the lenses diverge, so that no point can be sharp; masks
+                are finer than parts of cells and samples resolve; images of views are separate (ghosting); or
+                the image is 0 everywhere although the light field is not dark (with footprints only if no
+                mask closes the camera). If the image is 0 or nearly black, or at least a quarter of the rays
+                is missing, and a length is at least 1 m, a pitch 2 cm or a pixel 1 mm, the warning asks
+                whether a thousandth was meant.
 
         Raises:
-            InputError: an option that does not exist or does not go with the method, an element that returns
-                what it must not; of a light field on disk, views that are missing or damaged, or a memory limit
-                that is too small; a plan for another camera, or for another shape or frame of light field; an
-                executor that dies, that cannot reach the store or runs another version, or a light field in memory
+            InputError: an option that does not exist or does not fit the method; an element with an invalid
+                result; missing or damaged views in a light field on disk, or a memory limit that is too
+                small; a plan for another camera, or for another shape or frame of light field; an executor
+                that fails, that cannot reach the store or runs another version; or a light field in memory
                 that is too large to be sent to it.
         """
         check_is_light_field(light_field)
@@ -314,23 +316,24 @@ class Camera(Train):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Operator:
-        """The linear map from samples of a light field to the picture, with its adjoint: for what inverts cameras.
+        """The linear map from samples of a light field to the image, with its adjoint, for inverse problems.
 
-        ``op(samples)`` is the picture of any samples on the light field's grid, ``op.T(picture)`` the adjoint.
+        ``op(samples)`` returns the image of any samples on the light field's grid, ``op.T(picture)`` applies
+        the adjoint.
 
         Args:
-            light_field: whose grid counts; in memory, or on disk and then in pieces.
+            light_field: defines the grid; in memory, or on disk and then read in pieces.
             how: as in `capture`.
             plan: as in `capture`.
-            progress: called with (done, total) while disparities are found, where they are needed.
+            progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
 
         Raises:
-            InputError: what `capture` refuses; a tolerance, views in between by depth, and arrays of other
-                libraries than NumPy, with what to pass instead.
+            InputError: as for `capture`; also for a tolerance, intermediate views interpolated by depth, and
+                arrays of other libraries than NumPy; the message names the alternative.
 
         Warns:
-            ResultWarning: what the plan cautions of.
+            ResultWarning: the cautions of the plan.
         """
         check_is_light_field(light_field)
         chosen = How.of(how, options)
@@ -339,7 +342,7 @@ class Camera(Train):
     def _planned(
         self, light_field: Samples, how: How, plan: Plan | None, options: Options, progress: Progress | None
     ) -> Plan:
-        """A plan that was given, if it fits, or a new one; what it cautions of is said."""
+        """The given plan, if it fits, or a new one; warns of the plan's cautions."""
         if plan is None:
             plan = self.compile(light_field, how, progress=progress)
         else:
@@ -362,17 +365,17 @@ class Camera(Train):
         progress: Progress | None = None,
         **options: Any,
     ) -> Recording:
-        """What the sensor records of a light field, as its electronics number it, noise included (EMVA 1288).
+        """The digital numbers that the sensor records of a light field, including noise (EMVA 1288).
 
         Args:
-            light_field: given at the entrance plane z = 0.
+            light_field: at the entrance plane z = 0.
             exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the
-                pixels are at 90 % or more of their full well or of the largest number, whichever comes first, each
-                in its brightest channel.
-            seed: of the sensor's noise, a whole number. Recordings with different seeds are independent; the
-                same seed gives the same numbers, on any number of threads.
-            radiance: what a sample value of 1 stands for, W/(m²·sr), in each channel's band.
-            ray_seed: of the choice of rays, where rays are traced: the seed of `capture`.
+                pixels, each in its brightest channel, reach at least 90 % of the full well or of the largest
+                number, whichever comes first.
+            seed: of the sensor's noise, an integer. Recordings with different seeds are independent; the same seed
+                gives the same numbers, with any number of threads.
+            radiance: the radiance of a sample value of 1, W/(m²·sr), in each channel's band.
+            ray_seed: of the rays, if rays are traced: the seed of `capture`.
             how: as in `capture`.
             plan: as in `capture`.
             executor: as in `capture`.
@@ -380,11 +383,11 @@ class Camera(Train):
             options: as in `capture`.
 
         Raises:
-            InputError: a sensor without electronics, channels that they cannot record, an unusable exposure,
-                seed or radiance, "auto" without light, or what `capture` refuses.
+            InputError: a sensor without electronics, channels that they cannot record, an invalid exposure,
+                seed or radiance, "auto" without light, or an error of `capture`.
 
         Warns:
-            ResultWarning: as `capture` and `vcc.expose_image`.
+            ResultWarning: as for `capture` and `vcc.expose_image`.
         """
         check_is_light_field(light_field)
         chosen = How.of(how, {**options, "seed": ray_seed})
@@ -402,13 +405,14 @@ class Camera(Train):
         progress: Progress | None = None,
         **options: Unpack[Options],
     ) -> Explanation:
-        """The plan for a light field in words: what was folded, pulled to the sensor, chosen, and its cost.
+        """The plan for a light field as text: how optics are folded and moved to the sensor, all choices, and
+        the cost.
 
         Args:
-            light_field: given at the entrance plane; in memory or on disk.
+            light_field: at the entrance plane; in memory or on disk.
             how: as in `capture`.
-            executor: as in `capture`; it runs some views, and the times with and without it are estimated.
-            progress: called with (done, total) while disparities are found, where they are needed.
+            executor: as in `capture`; it runs some views to estimate the times with and without it.
+            progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
         """
         chosen = How.of(how, options)
@@ -426,15 +430,15 @@ class Camera(Train):
         """The light field at a plane inside the camera: affine optics folded, masks and diffusers applied.
 
         Args:
-            light_field: given at the entrance plane.
-            z: the plane, metres behind the entrance plane.
-            before: whether to stop before the elements that stand exactly at z.
-            memory_limit: bytes that new samples may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
-                Without a mask or a diffuser on the way nothing is allocated.
+            light_field: at the entrance plane.
+            z: of the plane, metres behind the entrance plane.
+            before: whether to stop before the elements that are exactly at z.
+            memory_limit: bytes for new samples; None uses `vcc.base.memory.MEMORY_LIMIT`. Without a mask or a
+                diffuser before the plane, nothing is allocated.
 
         Raises:
-            InputError: a light field on disk, z outside the camera, an element on the way that bends rays not as a
-                lens or a prism does, or more memory needed than allowed.
+            InputError: a light field on disk, z outside the camera, an element before z that is not affine,
+                unlike a lens or a prism, or more memory needed than allowed.
         """
         check_is_light_field(light_field)
         checks.finite("z", z, "metres")
@@ -450,31 +454,31 @@ class Camera(Train):
         return plot_camera(self, **options)
 
     def bench(self, light_field: InMemory) -> Any:
-        """This camera on the optical bench, in a notebook: move its elements, and see the picture follow.
+        """Open this camera on the optical bench, in a notebook: move its elements and see the image change.
 
-        The widget's ``camera`` is the camera as it stands on the bench at that moment; this one stays as it is.
+        The widget's ``camera`` is the current camera on the bench; this camera is not changed.
 
         Args:
-            light_field: given at the entrance plane, in memory.
+            light_field: at the entrance plane, in memory.
 
         Returns:
-            A widget, which the last line of a cell shows (Jupyter, VS Code, marimo).
+            A widget; show it as the last line of a cell (Jupyter, VS Code, marimo).
 
         Raises:
-            InputError: the package anywidget is not installed (extra ``notebook``), a light field that is not in
-                memory, or a camera that no file can hold: functions of Python, elements of your own.
+            InputError: the package anywidget is not installed (extra ``notebook``), the light field is not in
+                memory, or the camera cannot be stored in a file: Python functions, user-defined elements.
         """
         return lazy_import.module("vcc.bench.widget").bench_of(self, light_field)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write this camera as a TOML file that `vcc.load_camera` reads back. See `vcc.camera_file`."""
+        """Write this camera to a TOML file that `vcc.load_camera` reads. See `vcc.camera_file`."""
         write_train(self, path)
 
 
 def captured_in_batches(
     cameras: Sequence[Camera], light_field: Samples, how: How, *, seeds: Sequence[int] | None = None
 ) -> list[Image]:
-    """What `Camera.capture` gives of one light field for several cameras, in their order; see `each_captured`."""
+    """The results of `Camera.capture` for several cameras on one light field, in order; see `each_captured`."""
     images = dict(each_captured(cameras, light_field, how, seeds=seeds))
     return [images[number] for number in range(len(cameras))]
 
@@ -487,27 +491,27 @@ def each_captured(
     seeds: Sequence[int] | None = None,
     output_buffers: OutputBuffers | None = None,
 ) -> Iterator[tuple[int, Image]]:
-    """What `Camera.capture` gives of one light field for several cameras, which share what they can of the work.
+    """The results of `Camera.capture` for several cameras on one light field; the cameras share work if possible.
 
-    Cameras that differ in the cells of one mask alone, and are many, are made of a few pictures
-    (`vcc.plan.footprints.mixtures`). Others are planned each by itself, and share what
-    `vcc.run.batches.recorded_each` says.
+    Many cameras that differ only in the cells of one mask are computed from a few images
+    (`vcc.plan.footprints.mixtures`). Other cameras have separate plans, and share work as in
+    `vcc.run.batches.recorded_each`.
 
     Args:
-        cameras: in memory for some hundred bytes each; their pictures are made as they are asked for.
+        cameras: some hundred bytes of memory each; images are made on demand.
         light_field: as in `Camera.capture`.
-        how: likewise.
-        seeds: of rays, one for each camera; None takes that of ``how`` for all.
-        output_buffers: where some of the pictures may be made.
+        how: as in `Camera.capture`.
+        seeds: of rays, one per camera; None uses that of ``how`` for all.
+        output_buffers: where some of the images may be written.
 
     Returns:
-        Each camera's number and picture, as they are made.
+        Each camera's number and image, as soon as they are made.
 
     Warns:
-        ResultWarning: as `Camera.capture`, for each camera.
+        ResultWarning: as for `Camera.capture`, for each camera.
 
     Raises:
-        InputError: as `Camera.capture`.
+        InputError: as for `Camera.capture`.
     """
     check_is_light_field(light_field)
     light_field.check_complete()
@@ -516,12 +520,12 @@ def each_captured(
         return
     mixture = mixture_of(cameras, light_field.grid, how) if may_be_mixed(light_field, how) else None
     if mixture is not None:
-        cautions = Cautions(cameras[0], light_field.grid)  # of all of them: they differ in cells alone
+        cautions = Cautions(cameras[0], light_field.grid)  # the same for all: they differ in cells only
         _warn_of(cautions.before())
         found = zip(mixture.members, recorded_mixed(mixture, light_field, how, output_buffers), strict=True)
         for number, one in found:
             camera = cameras[number]
-            # A picture that is dark is explained by the camera's own plan.
+            # The camera's own plan explains a dark image.
             plan = mixture.plans[0] if one.values.any() else camera.compile(light_field, how)
             _warn_of(cautions.of(plan, light_field, one))
             yield number, camera._image(one)

@@ -1,4 +1,4 @@
-"""Camera files: a camera as TOML, with units in every length, written and read without loss.
+"""Camera files: lossless TOML files of cameras, with units for all lengths.
 
 ::
 
@@ -25,12 +25,11 @@
     pitch = "48 um"
 
 Patterns, kernels and surfaces are written by name: the classes of `vcc.patterns` (``open``, ``circle``,
-``polygon``, ``cells``, ``cosine_sum``, ``bounded`` …, and ``mura``), of `vcc.kernels` (``gaussian``,
-``top_hat``, ``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). Arrays
-are the name of a file or rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass of its own, such
-as a sensor's electronics, is a table: ``[sensor.electronics]``. A real lens is a ``first_order`` with
-``lens_file = "dgauss.50mm.dat"`` instead of a matrix. A sensor has a z, or ``focus = "1.2 m"``: the distance
-that is to be sharp (`vcc.Camera.focused`).
+``polygon``, ``cells``, ``cosine_sum``, ``bounded`` …, and ``mura``), of `vcc.kernels` (``gaussian``, ``top_hat``,
+``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). Arrays are file names or
+rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass, such as a sensor's electronics, is a table:
+``[sensor.electronics]``. A real lens is a ``first_order`` with ``lens_file = "dgauss.50mm.dat"`` instead of a
+matrix. A sensor has a z, or ``focus = "1.2 m"``: the distance in focus (`vcc.Camera.focused`).
 """
 
 from __future__ import annotations
@@ -47,33 +46,34 @@ from vcc.files.camera_writing import write_train
 
 
 def load_camera(path: str | PathLike[str]) -> Camera:
-    """The camera that a TOML file describes; see this module for its form.
+    """Read a camera from a TOML file; see this module for the format.
 
     Args:
-        path: the file. Arrays, pictures of masks and lens files are found relative to its folder.
+        path: the file. Paths of arrays, pictures of masks and lens files are relative to its folder.
 
     Raises:
-        InputError: no such file, not TOML, or anything in it that is unknown, missing, of a wrong
-            type, without a unit or refused by the element itself. The message names the file, the
-            element (counted from 1) and the field.
+        InputError: no such file, not TOML, or an entry that is unknown, missing, of a wrong type, without a
+            unit or invalid for its element. The message names the file, the element (counted from 1) and the
+            field.
     """
     train = read_train(path)
     return Camera(train.elements, train.sensor, name=train.name)
 
 
 def save_camera(camera: Camera, path: str | PathLike[str]) -> None:
-    """Write a camera as TOML, so that `load_camera` returns an equal one.
+    """Write a camera to a TOML file, from which `load_camera` reads an equal camera.
 
-    Arrays are written beside the file, as .npy named after it and the element, in SI; a mask's not if the
-    file that it came from is there already. A real lens keeps its lens file if that is beside the camera
-    file and still gives the same lens; otherwise its matrix is written. Files appear whole or not at all.
+    Arrays are written next to the file, as .npy files named after it and the element, in SI units. The array
+    of a mask is not written if the file that it came from is in this folder already. A real lens keeps its
+    lens file if that is next to the camera file and still gives the same lens; otherwise its matrix is
+    written. Files are written completely or not at all.
 
     Args:
         camera: what to write.
-        path: where to; an older file of that name is replaced.
+        path: of the file; an existing file is replaced.
 
     Raises:
-        InputError: an element, pattern, kernel or surface that a file cannot hold (any Python function), or a
-            folder that cannot be written to.
+        InputError: an element, pattern, kernel or surface that cannot be stored in a file (any Python
+            function), or a folder that is not writable.
     """
     write_train(camera, path)

@@ -1,4 +1,4 @@
-"""What goes wrong, as types: an error for bad input, warnings for results to read with care and for lost time."""
+"""Exceptions and warnings: errors for invalid input, warnings about doubtful results and about lost time."""
 
 from vcc.base.errors import (
     CacheWarning,

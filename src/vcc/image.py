@@ -1,4 +1,4 @@
-"""The picture that a sensor records: irradiance on a grid, and the frame that places it on the sensor."""
+"""The image class: irradiance on a grid of pixels, and the frame that places it on the sensor."""
 
 from __future__ import annotations
 
@@ -32,16 +32,15 @@ class Image(Shown):
     """Mean irradiance over each pixel, as light lands on the sensor.
 
     Args:
-        values: irradiance, shape (rows, columns) or (rows, columns, channels), radiance × steradian. For a
-            captured picture, an array of the library that the light field came in (NumPy: float32).
-        frame: maps (column, row, 1) to (x, y, 1) on the sensor, metres; x points right, y down, as seen by
-            someone looking at the scene.
-        missing_rays: the share of the rays that the camera asked for and the light field did not hold,
-            0 to 1.
-        sampling_error: for a picture made by rays, its estimated error from sampling, root mean square over the
-            pixels, in units of the values; 0 where nothing is sampled.
-        inverted: whether this is a real, upside-down image (what a camera records), which `upright` turns.
-        camera: what made it, or what a file says of that; None where not known. Files that are written name it.
+        values: irradiance, shape (rows, columns) or (rows, columns, channels), radiance × steradian. A
+            captured image has an array of the light field's library (NumPy: float32).
+        frame: maps (column, row, 1) to (x, y, 1) on the sensor, metres; x points right, y down, for a viewer
+            who faces the scene.
+        missing_rays: share of the camera's required rays that are outside the light field, 0 to 1.
+        sampling_error: of an image by rays: the estimated sampling error, root mean square over the pixels,
+            in units of the values; 0 without sampling.
+        inverted: whether this is a real, upside-down image (as a camera records it), which `upright` rotates.
+        camera: that made the image, or its description in a file; None if unknown. It is written to files.
     """
 
     values: Any
@@ -70,12 +69,12 @@ class Image(Shown):
         return abs(self.frame.determinant)
 
     def __getitem__(self, index: Index | tuple[Index, ...]) -> Image:
-        """A piece of the picture, in its place: slices along (rows, columns[, channel])."""
+        """A part of the image, with its frame: slices along (rows, columns[, channel])."""
         frame, ranges = indices(self.shape, self.frame, index, IMAGE_AXES, "an image")
         return replace(self, values=taken(self.values, ranges), frame=frame)
 
     def upright(self) -> Image:
-        """The picture as a person wants to see it: turned by 180° if it is inverted, else unchanged."""
+        """The image for viewing: rotated by 180° if it is inverted, otherwise unchanged."""
         if not self.inverted:
             return self
         rows, columns = self.shape[:2]
@@ -88,18 +87,19 @@ class Image(Shown):
         return replace(self, values=values, frame=turned, inverted=False)
 
     def to_numpy(self) -> NDArray[np.float32]:
-        """The values as a float32 NumPy array, wherever they are."""
+        """The values as a float32 NumPy array in main memory."""
         return to_numpy(self.values).astype(np.float32, copy=False)
 
     def __add__(self, other: Any) -> Image:
-        """The sum of two images of one frame, or of an image and a number.
+        """The sum of two images with the same frame, or of an image and a number.
 
-        The sum misses as many rays as the worse image; sampling errors add up. Other frames raise `InputError`.
+        The sum has the missing rays of the worse image; sampling errors add up. Different frames raise
+        `InputError`.
         """
         return self._combined(other, operator.add, "added to")
 
     def __sub__(self, other: Any) -> Image:
-        """The difference of two images of one frame, or of an image and a number; see the sum."""
+        """The difference of two images with the same frame, or of an image and a number; see the sum."""
         return self._combined(other, operator.sub, "subtracted from")
 
     def __mul__(self, factor: Any) -> Image:
@@ -150,7 +150,7 @@ class Image(Shown):
         """The image as an `xarray.DataArray` with the positions of its pixels; needs the package xarray.
 
         Returns:
-            Dimensions (y, x[, channel]). Coordinates x, y: middles of the pixels on the sensor, metres, x
+            Dimensions (y, x[, channel]). Coordinates x, y: centres of the pixels on the sensor, metres, x
             to the right and y down. Attributes: missing_rays, sampling_error, inverted.
 
         Raises:
@@ -178,11 +178,11 @@ class Image(Shown):
         return xarray.DataArray(self.to_numpy(), coords=places, dims=axes, name="image", attrs=about)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """The values, for ``numpy.asarray(image)``: as light lands on the sensor, not copied where that can be."""
+        """The values for ``numpy.asarray(image)``: inverted as on the sensor, without a copy if possible."""
         return as_array(self.values, dtype, copy)
 
     def to_srgb(self, exposure: Exposure = "auto", *, upright: bool = True, bits: int = 8) -> NDArray[Any]:
-        """The picture as screens show it: the sRGB codes that `save` writes to a PNG.
+        """The image as sRGB codes, as `save` writes it to a PNG.
 
         Args:
             exposure: as in `save`.
@@ -190,11 +190,11 @@ class Image(Shown):
             bits: 8 or 16.
 
         Returns:
-            uint8 or uint16, shape (rows, columns) of one channel, else (rows, columns, 3).
+            uint8 or uint16, shape (rows, columns) for one channel, otherwise (rows, columns, 3).
 
         Raises:
-            InputError: an exposure that is not a finite number above 0, other bits, values that are not finite, or
-                neither 1 nor 3 channels.
+            InputError: an exposure that is not a positive finite number, an invalid number of bits, values
+                that are not finite, or neither 1 nor 3 channels.
         """
         values = (self.upright() if upright else self).to_numpy()
         return coded_picture(values, exposure, bits, "in sRGB, which").codes
@@ -208,41 +208,42 @@ class Image(Shown):
         bits: int | None = None,
         format: str | None = None,
     ) -> SavedPicture:
-        """Write the picture; the ending of ``path`` chooses the format.
+        """Write the image; the ending of ``path`` selects the format.
 
-        - ``.png``: sRGB, 8 bits (or 16), for people
+        - ``.png``: sRGB, 8 bits (or 16), for viewing
         - ``.tif``, ``.tiff``: sRGB, 16 bits (or 8)
         - ``.jpg``, ``.jpeg``: sRGB, 8 bits, lossy, for slides; `load_image` does not read it
-        - ``.exr``: linear float32, values untouched; channels R, G, B or Y
-        - ``.npy``: linear float32, values untouched
+        - ``.exr``: linear float32, values unchanged; channels R, G, B or Y
+        - ``.npy``: linear float32, values unchanged
 
-        Each file says what its numbers are (`vcc.files.image_metadata`), and `load_image` gives the picture back.
+        Each file contains metadata about its numbers (`vcc.files.image_metadata`), so that `load_image`
+        restores the image.
 
         Args:
-            path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
-            exposure: the factor that brings the values to the range 0…1 of an sRGB file. "auto" takes 1 over the
-                99.5th percentile of the pixels' brightest channels: at most 0.5 % of the pixels clip. It is
-                returned, so that a second picture can be written with the same.
-            upright: turn a real image (which lies upside down on the sensor) so that people see it upright.
+            path: of the file; or a buffer, such as ``io.BytesIO()``, or a file opened with "wb".
+            exposure: the factor that maps the values to the range 0…1 of an sRGB file. "auto" uses 1 over the
+                99.5th percentile of the pixels' brightest channels: at most 0.5 % of the pixels clip. The
+                factor is returned, so that another image can be written with the same one.
+            upright: whether to rotate a real image (upside down on the sensor) for viewing.
             bits: bits per sample for PNG and TIFF.
             format: of a buffer: "png", "tif", "jpg", "exr" or "npy".
 
         Returns:
-            The path, the exposure used, the share of clipped pixels, and all that in words. The file appears
-            whole or not at all.
+            The path, the exposure, the share of clipped pixels, and all of this as text. The file is written
+            completely or not at all.
 
         Raises:
-            InputError: an unknown ending or format, a buffer without a format, a folder that does not exist or
-                cannot be written to, an exposure that is not a finite number above 0 (or not 1, for .exr and
-                .npy), bits that the format does not have, values that are not finite, or a number of channels that
-                the format cannot show.
+            InputError: an unknown ending or format, a buffer without a format, a folder that does not exist
+                or is not writable, an exposure that is not a positive finite number (or not 1, for .exr and
+                .npy), bits or a number of channels that the format does not support, or values that are not
+                finite.
         """
         shown = self.upright() if upright else self
         values, said = shown.to_numpy(), shown._metadata()
         return save_picture(values, path, statement=said, exposure=exposure, bits=bits, format=format)
 
     def _metadata(self) -> ImageMetadata:
-        """What the values are, for a file."""
+        """Metadata of the values, for a file."""
         mark = CameraMark.of(self.camera) if isinstance(self.camera, Train) else self.camera
         quantity: Quantity = "light" if mark is None else "irradiance"
         return ImageMetadata(quantity, upright=not self.inverted, frame=self.frame, camera=mark)
@@ -363,23 +364,23 @@ class PhotodiodeImage(Image):
 
 
 def load_image(path: str | PathLike[str]) -> Image:
-    """The picture in a file that `Image.save` or `vcc.Recording.save` wrote, by what the file says of itself.
+    """Read an image that `Image.save` or `vcc.Recording.save` wrote, using the metadata in the file.
 
-    The sRGB curve and the exposure are undone, raw numbers become the irradiance that they tell of, as
-    `vcc.Recording.image` has it, and the picture lies as it was stored: ``inverted`` says how.
+    The sRGB curve and the exposure are inverted; raw numbers are converted to irradiance, as in
+    `vcc.Recording.image`. The orientation is that of the file: see ``inverted``.
 
     Args:
         path: a PNG, TIFF, OpenEXR or .npy file.
 
     Returns:
-        float32; of sRGB files within half a code of the file, divided by the exposure.
+        float32; for sRGB files within half a code, divided by the exposure.
 
     Raises:
-        InputError: a file that cannot be read, does not say what its numbers are or how large its pixels, or whose
-            numbers have been changed since it was written.
+        InputError: a file that cannot be read, without metadata about its numbers or its pixel size, or with
+            numbers that were changed after it was written.
 
     Warns:
-        ResultWarning: pixels were too bright when the file was written: they are lower bounds.
+        ResultWarning: pixels were clipped when the file was written: their values are lower bounds.
     """
     stated = read_with_metadata(path)
     said = stated.metadata
@@ -390,7 +391,7 @@ def load_image(path: str | PathLike[str]) -> Image:
         )
     if said.frame is None:
         raise InputError(
-            f"{stated.path} does not say how large its pixels are, as a view of a folder does not: open the "
+            f"{stated.path} does not contain the size of its pixels; it may be a view of a light field: open the "
             "folder with vcc.open_light_field"
         )
     if said.clipped and said.recording is None:

@@ -1,4 +1,4 @@
-"""Cameras as functions that JAX takes derivatives of; needs the extra ``jax``."""
+"""Cameras as differentiable functions for JAX; needs the extra ``jax``."""
 
 from vcc.base import checks
 

@@ -1,7 +1,7 @@
-"""Scatter kernels, as users import them: how a diffuser spreads a ray over slopes (paper, section 3.2.2).
+"""Scatter kernels, for users: how a diffuser spreads a ray over slopes (paper, section 3.2.2).
 
-A kernel D(δs, δt) is the share of light that leaves with its slope changed by (δs, δt); its integral is 1, so
-that light is spread and none is lost.
+A kernel D(δs, δt) is the density of light that leaves with its slope changed by (δs, δt); its integral is 1,
+so that no light is lost.
 """
 
 from vcc.shapes.kernels import (

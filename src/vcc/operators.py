@@ -1,9 +1,9 @@
-"""The paper's operators on a light field itself, for those who want the field and not only the picture.
+"""The paper's operators on a light field: they return light fields instead of images.
 
-𝕋 (`vcc.LightField.transformed`) is exact and lazy. The others here make new samples: `resampled` puts the field
-on another grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor (S). A
-camera's picture needs none of them; they cost what 4-D data cost, so the size is computed first and refused
-above a limit.
+𝕋 (`vcc.LightField.transformed`) is exact and lazy. The other operators compute new samples: `resampled`
+changes the grid, `masked` is the dot product (·), `scattered` the convolution (⊗), `projected` the sensor
+(S). A camera's image needs none of them. They process 4-D data, so the size is computed first, and a size
+above the memory limit raises an error.
 """
 
 from vcc.image import Image
@@ -24,5 +24,5 @@ __all__ = [
 
 
 def projected(light_field: LightField, sensor: Sensor) -> Image:
-    """The picture on a sensor that lies in the light field's own plane; see `vcc.LightField.projected`."""
+    """The image on a sensor in the light field's plane; see `vcc.LightField.projected`."""
     return light_field.projected(sensor)

@@ -1,9 +1,9 @@
-"""Transmission patterns, as users import them: what a mask lets through, as a function of position.
+"""Transmission patterns, for users: the transmission of a mask as a function of position.
 
-A pattern is called with positions (x, y) in metres from its own middle (x right, y down) and returns the
-transmitted share, 0 to 1. Light fields are sampled in cells, so what a camera needs is a pattern's *mean* over
-a rectangle, never its value at a point: patterns with a closed form give it exactly, the others through a fine
-raster. Any function of (x, y) can be used as a pattern through `as_pattern`.
+A pattern is called with positions (x, y) in metres relative to its centre (x right, y down) and returns the
+transmitted share, 0 to 1. Light fields are sampled in cells, so a camera needs a pattern's *mean* over a
+rectangle, not its value at a point: patterns with a closed form compute it exactly, others with a fine
+raster. Any function of (x, y) becomes a pattern with `as_pattern`.
 """
 
 from typing import Any

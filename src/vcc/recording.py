@@ -1,4 +1,4 @@
-"""Recordings: the digital numbers that a sensor gave, and what can be done with them."""
+"""The recording class: the digital numbers of a sensor, with methods that convert and save them."""
 
 from __future__ import annotations
 
@@ -28,90 +28,87 @@ from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(RawPicture, Shown):
-    """The digital numbers that a sensor gave, as they are read out, and what is needed to understand them.
+    """The digital numbers of a sensor, as they are read out, with the data to interpret them.
 
-    Made by `vcc.Camera.expose` and `expose_image`; or of numbers kept in a file, with the camera's sensor
+    Made by `vcc.Camera.expose` and `expose_image`; or read from a file with the camera's sensor
     (`load_recording`).
 
     Args:
-        values: digital numbers, uint8 (up to 8 bits) or uint16. (rows, columns) behind a colour filter or of grey
-            light, else (rows, columns, channels): one sensor per channel, behind a prism that parts the colours.
-            As light lands on the sensor, upside down.
-        sensor: what recorded them, its electronics included.
+        values: digital numbers, uint8 (up to 8 bits) or uint16. (rows, columns) with a colour filter or for
+            grey light, otherwise (rows, columns, channels): one sensor per channel, behind a prism that
+            separates colours. Inverted as on the sensor, upside down.
+        sensor: that recorded them, with electronics.
         exposure: exposure time, seconds.
-        radiance: what a light field's sample value of 1 stands for, W/(m²·sr).
+        radiance: the radiance of a light field's sample value of 1, W/(m²·sr).
         seed: of the noise.
-        saturated: the share of the pixels, 0 to 1, that were at full well or at the largest number (in any
-            channel).
-        missing_rays: the share of the rays that the camera asked for and the light field did not hold, 0 to 1.
-        camera: what made it, or what a file says of that; None where not known. Files that are written name it.
+        saturated: share of the pixels, 0 to 1, at full well or at the largest number (in any channel).
+        missing_rays: share of the camera's required rays that are outside the light field, 0 to 1.
+        camera: that made the recording, or its description in a file; None if unknown. It is written to files.
 
     Raises:
-        InputError: a sensor without electronics, or values of another shape or type.
+        InputError: a sensor without electronics, or values of a wrong shape or type.
     """
 
     camera: Train | CameraMark | None = None
 
     def image(self) -> Image:
-        """The irradiance that the numbers tell of: what `vcc.Camera.capture` gives, and noise.
+        """The irradiance estimated from the numbers: as from `vcc.Camera.capture`, with noise.
 
-        The mean dark charge is taken off; PRNU and DSNU stay, as they would without a calibration. Where a pixel
-        is saturated the irradiance is a lower bound.
+        The mean dark charge is subtracted; PRNU and DSNU stay, as without a calibration. For saturated pixels the
+        irradiance is a lower bound.
 
         Returns:
-            float32 irradiance, shape of the values (behind a colour filter: each pixel in its own channel).
+            float32 irradiance, shape of the values (with a colour filter: each pixel in its own channel).
         """
         return Image(self.irradiance(), self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
     def demosaiced(self, method: Demosaicing | None = None) -> Image:
-        """The picture in all channels, of a recording through a colour filter, in the unit of `image`.
+        """The image in all channels, for a recording with a colour filter, in the unit of `image`.
 
-        - ``"menon"``: Menon et al. (2007), edges followed by direction; Bayer tiles. The default there.
+        - ``"menon"``: Menon et al. (2007), interpolates along edges; Bayer tiles. The default for these.
         - ``"malvar"``: Malvar et al. (2004), linear with gradients of the other channels; Bayer tiles.
-        - ``"bilinear"``: each channel by itself, the nearest samples weighted by distance (normalised
+        - ``"bilinear"``: each channel separately, the nearest samples weighted by distance (normalised
           convolution, Knutsson & Westin 1993); any tile. The default for other tiles.
 
-        The first two are those of the package colour-demosaicing, an optional one; all work on linear irradiance,
-        in which grey light has the same value in every channel.
+        The first two use the optional package colour-demosaicing; all methods work on linear irradiance, in
+        which grey light has the same value in every channel.
 
         Returns:
-            float32 irradiance, shape (rows, columns, channels); upside down, as light lands on the sensor.
+            float32 irradiance, shape (rows, columns, channels); inverted as on the sensor, upside down.
 
         Raises:
-            InputError: nothing to demosaic, an unknown method or one that the tile does not allow, a sensor
-                smaller than its tile, or a package that is not installed.
+            InputError: no colour filter, an unknown method, a method that does not support the tile, a sensor
+                smaller than its tile, or a missing package.
         """
         electronics = self.electronics
         if electronics.color_filter is None:
-            raise InputError(
-                "there is no colour filter to demosaic: every pixel recorded all that there is. Use image()"
-            )
+            raise InputError("the sensor has no colour filter, so that there is nothing to demosaic: use image()")
         values = demosaic(self.irradiance(), electronics, method)
         return Image(values, self.frame, missing_rays=self.missing_rays, camera=self.camera)
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        """The digital numbers, for ``numpy.asarray(recording)``, not copied where that can be."""
+        """The digital numbers for ``numpy.asarray(recording)``, without a copy if possible."""
         return as_array(self.values, dtype, copy)
 
     def save(self, path: Target, *, format: str | None = None) -> SavedPicture:
-        """Write the numbers untouched to a .tif, .png or .npy: linear, not scaled, upside down as recorded.
+        """Write the numbers unchanged to a .tif, .png or .npy file: linear, not scaled, upside down as recorded.
 
-        The file also says, as JSON, what the numbers mean (exposure, gain, black level, filter, …; see
-        `vcc.files.image_metadata`), and `load_recording` gives the recording back.
+        The file also contains JSON metadata about the numbers (exposure, gain, black level, filter, …; see
+        `vcc.files.image_metadata`), so that `load_recording` restores the recording.
 
         Args:
-            path: where to; or a buffer to write to, such as ``io.BytesIO()``, or a file opened with "wb".
+            path: of the file; or a buffer, such as ``io.BytesIO()``, or a file opened with "wb".
             format: of a buffer: "tif", "png" or "npy".
 
         Raises:
-            InputError: another ending or format, a buffer without a format, channels that the format cannot hold,
-                or a place that cannot be written.
+            InputError: an unsupported ending or format, a buffer without a format, channels that the format
+                does not support, or a file that cannot be written.
         """
         words = f"{self.electronics.bit_depth}-bit raw, {self.electronics.filter_in_words}, {self._in_words()}"
         return save_numbers(self.values, path, self._metadata(), words, format)
 
     def _metadata(self) -> ImageMetadata:
-        """What the numbers are, for a file."""
+        """Metadata of the numbers, for a file."""
         return ImageMetadata(
             "digital numbers",
             upright=False,
@@ -123,7 +120,7 @@ class Recording(RawPicture, Shown):
         )
 
     def _raw_numbers(self) -> RawNumbers:
-        """What the numbers stand for."""
+        """The parameters that interpret the numbers."""
         electronics = self.electronics
         return RawNumbers(
             exposure_seconds=self.exposure,
@@ -186,42 +183,43 @@ def expose_image(
     radiance: float = 1.0,
     threads: int | None = None,
 ) -> Recording:
-    """What a sensor records of a picture that falls on it; cheaper than `vcc.Camera.expose` for many exposures.
+    """The recording of an image on a sensor; cheaper than `vcc.Camera.expose` for many exposures.
 
     Args:
         image: irradiance on that sensor, from `vcc.Camera.capture`: radiance × steradian.
         sensor: with electronics.
-        exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the pixels
-            are at 90 % or more of their full well or of the largest number, whichever comes first, each in its
-            brightest channel.
-        seed: of the noise, a whole number; recordings with different seeds are independent.
-        radiance: what a light field's sample value of 1 stands for, W/(m²·sr), in each channel's band.
-        threads: how many work at once; None takes as many as this process may use cores. The numbers are the same.
+        exposure: exposure time, seconds, or ``"auto"``: the time after which the brightest 0.1 % of the
+            pixels, each in its brightest channel, reach at least 90 % of the full well or of the largest
+            number, whichever comes first.
+        seed: of the noise, an integer; recordings with different seeds are independent.
+        radiance: the radiance of a light field's sample value of 1, W/(m²·sr), in each channel's band.
+        threads: how many run at once; None uses all cores available to this process. The numbers do not
+            depend on it.
 
     Raises:
-        InputError: a sensor without electronics or of another shape, an upright picture, channels that the
-            electronics cannot record, values that are not finite, an unusable exposure, seed or radiance; or
+        InputError: a sensor without electronics or of another shape, an upright image, channels that the
+            electronics cannot record, values that are not finite, an invalid exposure, seed or radiance; or
             "auto" without light.
 
     Warns:
-        ResultWarning: the picture goes below 0 by more than `vcc.run.expose.UNDERSHOOT` of its largest value. No
-            light can, so it is taken as dark there, as it is where sharp interpolation undershoots by less beside
-            a hard edge.
+        ResultWarning: the image is negative by more than `vcc.run.expose.UNDERSHOOT` of its largest value.
+            Negative light does not exist, so it is set to 0. Smaller undershoots, from sharp interpolation at
+            hard edges, are also set to 0, without a warning.
     """
     return recorded(image, Exposure(sensor, exposure, seed, radiance, threads))
 
 
 def recorded(image: Image, exposure: Exposure) -> Recording:
-    """What a sensor records of a picture that falls on it; see `expose_image`, and `vcc.Camera.expose`.
+    """The recording of an image on a sensor; see `expose_image`, and `vcc.Camera.expose`.
 
     Args:
         image: irradiance, not upright.
-        exposure: how the sensor records.
+        exposure: the settings of the recording.
     """
     if isinstance(image, PhotodiodeImage):
         return _recorded_by_photodiodes(image, exposure)
     if not image.inverted:
-        raise InputError("a sensor records the picture as it lies on it: give the one that is not upright")
+        raise InputError("the image is upright, but a sensor records the inverted one: pass the image as captured")
     light = image.to_numpy()
     raw = exposure.recorded(light, image.missing_rays)
     caution = below_zero(light)
@@ -258,20 +256,21 @@ def _recorded_by_photodiodes(image: PhotodiodeImage, exposure: Exposure) -> Phot
 
 
 def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
-    """The recording in a file that `Recording.save` wrote.
+    """Read a recording from a file that `Recording.save` wrote.
 
     Args:
         path: a TIFF, PNG or .npy file.
-        sensor: what recorded it, with electronics; a file tells only what its numbers stand for.
+        sensor: that recorded it, with electronics; the file contains only the parameters that interpret the
+            numbers.
 
     Raises:
-        InputError: a file that cannot be read, that does not say that it is such a recording, or whose numbers
-            have been changed since it was written; a sensor that the file contradicts.
+        InputError: a file that cannot be read, without metadata of such a recording, or with numbers that
+            were changed after it was written; a sensor that contradicts the file.
     """
     stated = read_with_metadata(path)
     said = stated.metadata
     if said is None or said.recording is None:
-        is_none = unknown(stated) if said is None else f"{path} says that its numbers are {said.in_words}"
+        is_none = unknown(stated) if said is None else f"{path} contains {said.in_words}"
         raise InputError(
             f"{is_none}, not those of a recording: vcc.load_image reads pictures, and vcc.Recording takes "
             "numbers, a sensor and an exposure time"
@@ -290,7 +289,7 @@ def load_recording(path: str | PathLike[str], sensor: Sensor) -> Recording:
     wrong = numbers.unlike(own)
     if wrong is not None:
         raise InputError(
-            f"{path} says that {wrong} is {getattr(numbers, wrong)}, and with this sensor it is "
-            f"{getattr(own, wrong)}: give the one that recorded it"
+            f"{wrong} is {getattr(numbers, wrong)} in {path}, but {getattr(own, wrong)} for this sensor: "
+            "pass the sensor that recorded it"
         )
     return found

@@ -1,4 +1,4 @@
-"""Cameras as modules of PyTorch, which learn; needs the extra ``torch``."""
+"""Cameras with learnable parameters as modules for PyTorch; needs the extra ``torch``."""
 
 from vcc.base import checks
 

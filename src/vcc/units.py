@@ -1,7 +1,7 @@
-"""Units as plain factors to SI, so that code reads ``Lens(focal_length=50 * mm)``: what users import.
+"""Units as factors to SI, for users: ``Lens(focal_length=50 * mm)``.
 
-Everything inside this library is in metres, radians and seconds; slopes are dimensionless. ``parse`` reads a
-quantity with its unit, as camera files and the command line carry it.
+All values in this library are in metres, radians and seconds; slopes are dimensionless. ``parse`` reads a quantity
+with its unit, as in camera files and on the command line.
 """
 
 from vcc.base.units import (

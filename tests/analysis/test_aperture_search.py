@@ -100,7 +100,7 @@ def test_reports_progress_and_stops_when_told():
         ({"generations": 0}, "generations is a whole number"),
         ({"patience": 0}, "patience is a whole number"),
         ({"survivors": 1}, "survivors is a whole number, 2 or more, not 1; fewer cannot breed"),
-        ({"population": 10, "survivors": 10}, "no place for children"),
+        ({"population": 10, "survivors": 10}, "leaves no children"),
         ({"mutation": 1.5}, "probability of mutation must be from 0 to 1"),
         ({"exchange": -0.1}, "probability of exchange must be from 0 to 1"),
     ],

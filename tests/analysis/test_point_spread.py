@@ -288,7 +288,7 @@ def test_what_is_refused():
         otf(found, shape=(2, 3))
     with refused("without light"):
         otf(replace(found, values=np.zeros((3, 3)), finer=None))
-    with refused("finer holds other light than values"):
+    with refused("the light in finer differs from values"):
         replace(found, values=np.roll(found.values, 1))
     power = natural_image_power((8, 8))
     for arguments, words in [

@@ -291,7 +291,7 @@ def refused(words):
 def test_what_is_refused():
     with refused("of shape 2×2×4×4 needs 512 bytes"):
         fft4(LIGHT_FIELD, memory_limit=100)
-    with refused("window 'hat' is none"):
+    with refused("window 'hat' is unknown"):
         fft4(LIGHT_FIELD, "hat")
     with refused("a list of four"):
         fft4(LIGHT_FIELD, ["hann"])

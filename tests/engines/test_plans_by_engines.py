@@ -392,7 +392,7 @@ def test_a_plan_for_something_else_is_refused():
         further.capture(lf, plan=plan)
     with pytest.raises(vcc.InputError, match=r"for another frame of light field: make it anew"):
         case.camera.capture(lf.scaled(1.01), plan=plan)
-    with pytest.raises(vcc.InputError, match="method is decided when a plan is made: leave it out"):
+    with pytest.raises(vcc.InputError, match="method is fixed when a plan is made: leave it out"):
         case.camera.capture(lf, plan=plan, method="rays")
     with pytest.raises(vcc.InputError, match="tolerance is for pictures made by rays"):
         case.camera.capture(lf, plan=plan, tolerance=0.01)

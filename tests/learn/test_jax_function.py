@@ -221,14 +221,14 @@ def test_what_it_is_is_told(learned):
     [
         ({"learn": "sensor.z"}, r'learn is a list of names: write learn=\["sensor.z"\]'),
         ({"learn": ["sensor.zz"]}, r"no parameter 'sensor.zz'; did you mean sensor.z"),
-        ({"learn": ["sensor.electronics.gain"]}, r"gain is learned of what is recorded.*vcc.torch.CameraModule"),
+        ({"learn": ["sensor.electronics.gain"]}, r"gain affects recordings.*vcc.torch.CameraModule"),
         ({"field": jnp.ones(SHAPE)}, "light_field is a vcc.LightField"),
         (
             {"field": FIELD.replaced(jnp.ones(SHAPE))},
             r"the light field is a jax.*ArrayImpl.* light_field.replaced\(numpy.asarray",
         ),
         ({"engine": "array_api"}, "engine='array_api' carries gradients to samples only"),
-        ({"method": "rays"}, "no derivative to main.focal_length .* against a border between cells of mask"),
+        ({"method": "rays"}, "no derivative to main.focal_length .* across a border between cells of mask"),
     ],
 )
 def test_a_function_that_cannot_be_made(given, said):
@@ -239,19 +239,19 @@ def test_a_function_that_cannot_be_made(given, said):
 @pytest.mark.parametrize(
     ("values", "samples", "said"),
     [
-        ({"main.z": 0.0}, None, "values have main.z, which is not learned here: there are code.pattern, main"),
-        ({"sensor.z": "far"}, None, "values for sensor.z are an array of floating point, not str"),
-        ({"sensor.z": 50}, None, "values for sensor.z are floating point, not int32"),
+        ({"main.z": 0.0}, None, "values have main.z, which is not learned; learned are code.pattern, main"),
+        ({"sensor.z": "far"}, None, "values for sensor.z must be a floating-point array, not str"),
+        ({"sensor.z": 50}, None, "values for sensor.z must be floating point, not int32"),
         ({"code.pattern": np.ones((4, 4))}, None, r"have the shape \(3, 4\), .* not \(4, 4\)"),
         (
             {"code.pattern": np.ones((2, 3, 4)), "sensor.z": np.ones(3)},
             None,
-            "values for code.pattern, sensor.z have different numbers of pictures",
+            "values for code.pattern, sensor.z have different numbers of images",
         ),
-        ({}, "views", "samples are an array, not str"),
-        ({}, jnp.ones(SHAPE, jnp.bfloat16), r"not bfloat16: convert them, samples.astype\(jax.numpy.float32\)"),
+        ({}, "views", "samples must be an array, not str"),
+        ({}, jnp.ones(SHAPE, jnp.bfloat16), r"not bfloat16: pass samples.astype\(jax.numpy.float32\)"),
         ({}, jnp.ones(SHAPE[1:]), r"samples have the shape \(4, 9, 10\), .* has \(5, 4, 9, 10\)"),
-        ({}, jnp.ones((0, *SHAPE)), "are none"),
+        ({}, jnp.ones((0, *SHAPE)), "are empty"),
     ],
 )
 def test_what_a_function_does_not_take(learned, values, samples, said):
@@ -260,19 +260,17 @@ def test_what_a_function_does_not_take(learned, values, samples, said):
 
 
 def test_values_that_are_left_out_are_named(learned):
-    with pytest.raises(
-        vcc.InputError, match=r"values are a dict of arrays by the names of parameters.* not float"
-    ):
+    with pytest.raises(vcc.InputError, match=r"values must be a dict of arrays by parameter name.* not float"):
         learned(0.05)
-    with pytest.raises(vcc.InputError, match=r"values have no main.focal_length: give all that is learned"):
+    with pytest.raises(vcc.InputError, match=r"values have no main.focal_length: pass all learned parameters"):
         learned({"code.pattern": np.ones((3, 4))})
 
 
 @pytest.mark.parametrize(
     ("values", "samples", "said"),
     [
-        ({"sensor.z": np.nan}, None, r"sensor.z \(z of the sensor\) is nan: the step that led here was too long"),
-        ({"code.pattern": np.full((3, 4), 1.5)}, None, "transmission lies between 0 and 1"),
+        ({"sensor.z": np.nan}, None, r"sensor.z \(z of the sensor\) is nan: the last step was too long"),
+        ({"code.pattern": np.full((3, 4), 1.5)}, None, "transmission is between 0 and 1"),
         (
             {},
             jnp.ones(SHAPE).at[1, 2, 3, 4].set(jnp.nan),
@@ -288,7 +286,7 @@ def test_what_is_found_when_the_picture_is_made_is_said_by_jax(learned, values, 
 
 def test_a_loss_that_is_no_number_ends_on_its_way_back():
     learned = function(["sensor.z"])
-    with pytest.raises(Exception, match=r"weights of a picture are finite numbers; at \(0, 0\) there is nan"):
+    with pytest.raises(Exception, match=r"weights of an image must be finite; at \(0, 0\) there is nan"):
         jax.grad(lambda values: (learned(values) * jnp.nan).sum())(learned.values)
 
 
@@ -297,7 +295,7 @@ def test_the_second_derivative_is_refused(twice):
     learned = function(["sensor.z"])
     energy = lambda z: (learned({"sensor.z": z}) ** 2).sum()  # noqa: E731
     z = learned.values["sensor.z"]
-    with pytest.raises(vcc.InputError, match="pictures have first derivatives only"):
+    with pytest.raises(vcc.InputError, match="images have first derivatives only"):
         twice(jax.grad(energy))(z)
     for ahead in (jax.jacfwd, jax.hessian):
         with pytest.raises(TypeError, match="can't apply forward-mode"):

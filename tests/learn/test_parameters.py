@@ -142,16 +142,22 @@ def test_choices_and_functions_are_none():
 @pytest.mark.parametrize(
     ("values", "said"),
     [
-        ({"main.focal_length": math.nan}, r"main.focal_length \(focal_length of lens \"main\"\) is nan: the step"),
+        (
+            {"main.focal_length": math.nan},
+            r"main.focal_length \(focal_length of lens \"main\"\) is nan: the last step",
+        ),
         (
             {"code.pattern": np.where(np.eye(3, 4), np.inf, 0.5)},
             r"\(pattern of mask \"code\"\) is inf at index \(0, 0\)",
         ),
         (
             {"code.pattern": np.full((3, 4), 1.5)},
-            r"code.pattern \(pattern of mask \"code\"\) goes from 1.5 to 1.5, and transmission lies between 0",
+            r"code.pattern \(pattern of mask \"code\"\) goes from 1.5 to 1.5, but transmission is between 0",
         ),
-        ({"code.pattern": np.ones((3, 3))}, r"code.pattern has the shape \(3, 4\), and numbers of shape \(3, 3\)"),
+        (
+            {"code.pattern": np.ones((3, 3))},
+            r"code.pattern has the shape \(3, 4\), but the values have the shape \(3, 3\)",
+        ),
         ({"main.diameter": -1.0}, r"main.diameter: diameter of lens \"main\" must be greater than 0 m, not -1.0"),
         ({"sensor.z": 0.0, "main.z": 0.0}, r"sensor.z, main.z: mask \"code\" .* stands behind the sensor"),
     ],

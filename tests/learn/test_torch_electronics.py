@@ -135,14 +135,14 @@ def test_what_clips_has_no_gradient_and_no_light_a_finite_one():
 def test_what_is_saturated_has_no_gradient_and_says_so(electrons, saturated):
     light = even(electrons)
     light[: round(40 * (1 - saturated))] /= 100
-    with pytest.warns(vcc.base.errors.ResultWarning, match="and its gradients are 0") as told:
+    with pytest.warns(vcc.base.errors.ResultWarning, match="and have gradients of 0") as told:
         gradient = gradient_of(light.clone())
     assert ((gradient == 0).double().mean().item()) == pytest.approx(saturated)
     said = str(told[0].message)
     # The full well of 2000 electrons is reached before 4095 numbers of 1.5 an electron; 0.9 of it is left.
-    assert f"{saturated:.1%} of what is recorded in 10 ms is saturated" in said
+    assert f"{saturated:.1%} of the values recorded in 10 ms are saturated" in said
     shorter = TIME * 0.9 * 2000 / electrons
-    assert f"{shorter * 1e3:.3g} ms saturates nothing" in said
+    assert f"{shorter * 1e3:.3g} ms saturates no pixel" in said
     assert (gradient_of(light.clone(), shorter) != 0).all()
     expose(light, SENSOR, TIME)  # without gradients nothing is lost
 
@@ -159,8 +159,8 @@ def test_the_same_generator_draws_the_same_noise():
     ("change", "said"),
     [
         ({"picture": torch.ones(3, 3)}, r"the sensor has \(40, 50\) pixels .* the shape \(3, 3\)"),
-        ({"picture": np.ones((40, 50))}, "picture is a tensor of floating point, .* not ndarray"),
-        ({"picture": torch.ones(40, 50, dtype=torch.int32)}, "picture is a tensor .* not torch.int32"),
+        ({"picture": np.ones((40, 50))}, "picture must be a floating-point tensor, .* not ndarray"),
+        ({"picture": torch.ones(40, 50, dtype=torch.int32)}, "picture must be a .* tensor, .* not torch.int32"),
         ({"picture": torch.full((40, 50), math.nan)}, "values that are not finite"),
         ({"sensor": vcc.Sensor(0.05, (40, 50), 5 * um)}, "the sensor has no electronics"),
         ({"sensor": with_electronics(color_filter="RGGB")}, "wants light of 3 channels"),

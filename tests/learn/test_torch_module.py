@@ -151,7 +151,7 @@ def test_only_what_needs_a_gradient_gets_one():
 def test_the_second_derivative_is_refused():
     model = exact()
     (gradient,) = torch.autograd.grad(model().square().sum(), model.sensor.z, create_graph=True)
-    with pytest.raises(vcc.InputError, match="pictures have first derivatives only"):
+    with pytest.raises(vcc.InputError, match="images have first derivatives only"):
         gradient.backward()
 
 
@@ -188,7 +188,7 @@ def test_the_state_has_the_parameters_by_their_names(tmp_path):
     assert other.camera() == model.camera() != CAMERA
     longer = vcc.Camera([vcc.Lens(150 * mm, 5 * mm, name="main"), CODE], SENSOR)
     with pytest.raises(
-        vcc.InputError, match=r"main.focal_length is kept in multiples of .* go on from model.camera"
+        vcc.InputError, match=r"main.focal_length is stored in multiples of .* continue from model.camera"
     ):
         module([*LEARN, "sensor.electronics.gain"], longer).load_state_dict(model.state_dict())
 
@@ -230,7 +230,7 @@ def test_a_state_that_was_planned_for_something_else_is_refused():
         (module(camera=prism), "another camera,"),
     ):
         with pytest.raises(
-            vcc.InputError, match=f"planned for {what} and the same plan cannot be made here"
+            vcc.InputError, match=f"planned for {what} so that the same plan cannot be made"
         ) as told:
             other.load_state_dict(state)
         alone = dict(state)
@@ -467,21 +467,21 @@ def test_what_it_is_is_told():
         ({"learn": "sensor.z"}, r'learn is a list of names: write learn=\["sensor.z"\]'),
         ({"learn": ["sensor.zz"]}, r"no parameter 'sensor.zz'; did you mean sensor.z"),
         ({"learn": ["sensor.z", "sensor.z"]}, "sensor.z is listed 2 times in learn"),
-        ({"learn": [SENSOR]}, "learn is a list of names of parameters, not of Sensor"),
+        ({"learn": [SENSOR]}, "learn must be a list of parameter names, but contains a Sensor"),
         ({"learn": ["sensor.shape"]}, "sensor.shape .* cannot be learned"),
         ({"field": torch.ones(SHAPE)}, "light_field is a vcc.LightField, not a Tensor"),
-        ({"constraints": {"main.z": binary}}, "main.z has constraints and is not learned"),
-        ({"constraints": {"sensor.z": 3.0}}, "constraints of sensor.z are functions of tensors, not float"),
+        ({"constraints": {"main.z": binary}}, "main.z has constraints but is not learned"),
+        ({"constraints": {"sensor.z": 3.0}}, "constraints of sensor.z must be functions of tensors, not float"),
         ({"engine": "array_api"}, "engine='array_api' carries gradients to samples only"),
         (
             {"learn": [], "method": "rays", "tolerance": 0.01},
-            "tolerance takes more rays until one picture is",
+            "tolerance adds rays until an image is",
         ),
-        ({"method": "rays"}, "no derivative to main.focal_length .* against a border between cells of mask"),
+        ({"method": "rays"}, "no derivative to main.focal_length .* across a border between cells of mask"),
         ({"metod": "rays"}, "there is no option metod: did you mean method"),
         (
             {"camera": vcc.Camera([vcc.Lens(0.05, name="forward")], SENSOR), "learn": ["forward.z"]},
-            "a torch.nn.Module has something else of the name 'forward'",
+            "a torch.nn.Module has another attribute 'forward'",
         ),
     ],
 )
@@ -496,11 +496,11 @@ META = torch.empty(SHAPE, device="meta")
 @pytest.mark.parametrize(
     ("samples", "values", "said"),
     [
-        (np.ones(SHAPE), None, "samples are a tensor, not ndarray"),
+        (np.ones(SHAPE), None, "samples must be a tensor, not ndarray"),
         (torch.ones(5, 4, 9, 9), None, r"samples have the shape \(5, 4, 9, 9\), .* has \(5, 4, 9, 10\)"),
-        (torch.ones(0, *SHAPE), None, "are none"),
-        (torch.ones(SHAPE, dtype=torch.bfloat16), None, r"not torch.bfloat16: convert them, samples.float\(\)"),
-        (META, None, r"samples are on meta, and what learns is computed on the CPU: pass tensor.cpu\(\)"),
+        (torch.ones(0, *SHAPE), None, "are empty"),
+        (torch.ones(SHAPE, dtype=torch.bfloat16), None, r"not torch.bfloat16: pass samples.float\(\)"),
+        (META, None, r"samples are on meta, but learning runs on the CPU: pass tensor.cpu\(\)"),
         (
             torch.full(SHAPE, math.nan),
             None,
@@ -509,9 +509,9 @@ META = torch.empty(SHAPE, device="meta")
         (
             None,
             {"main.z": torch.tensor(0.0)},
-            "values has main.z, which is not learned here: there are code.pattern",
+            "values has main.z, which is not learned; learned are code.pattern",
         ),
-        (None, {"sensor.z": 0.05}, "values for sensor.z are a tensor of floating point, not float"),
+        (None, {"sensor.z": 0.05}, "values for sensor.z must be a floating-point tensor, not float"),
         (None, {"code.pattern": torch.ones(4, 4)}, r"have the shape \(3, 4\), .* not \(4, 4\)"),
         (None, {"code.pattern": torch.ones(2, 2, 3, 4)}, r"not \(2, 2, 3, 4\)"),
         (None, {"sensor.z": torch.empty((), device="meta")}, "values for sensor.z are on meta"),
@@ -519,13 +519,13 @@ META = torch.empty(SHAPE, device="meta")
         (
             None,
             {"code.pattern": torch.full((3, 4), 1.5)},
-            r'code.pattern \(pattern of mask "code"\) goes from 1.5 to 1.5, and transmission .* 0 and 1. '
-            "Learn free numbers below a constraint .*, or clamp it to 0 and 1 after each step",
+            r'code.pattern \(pattern of mask "code"\) goes from 1.5 to 1.5, but transmission .* 0 and 1. '
+            "Learn free numbers with a constraint .*, or clamp it to 0 and 1 after each step",
         ),
         (
             None,
             {"code.pattern": torch.ones(2, 3, 4), "sensor.z": torch.tensor([0.054, 0.055, 0.056])},
-            "values for code.pattern, sensor.z have different numbers of pictures",
+            "values for code.pattern, sensor.z have different numbers of images",
         ),
     ],
 )
@@ -544,20 +544,20 @@ def test_a_parameter_that_is_no_number_any_more_is_named():
 
 
 def test_a_loss_that_is_no_number_ends_on_its_way_back():
-    with pytest.raises(vcc.InputError, match=r"weights of a picture are finite numbers; at \(0, 0\) there is nan"):
+    with pytest.raises(vcc.InputError, match=r"weights of an image must be finite; at \(0, 0\) there is nan"):
         (exact()() * math.nan).sum().backward()
 
 
 def test_a_module_elsewhere_is_told_that_there_is_no_engine():
     with pytest.raises(
-        vcc.InputError, match=r"code.pattern is on meta, and what learns is computed on the CPU.*model.cpu\(\)"
+        vcc.InputError, match=r"code.pattern is on meta, but learning runs on the CPU.*model.cpu\(\)"
     ):
         module().to("meta")()
 
 
 def test_constraints_that_change_the_shape_are_named():
     with pytest.raises(
-        vcc.InputError, match=r"constraints of code.pattern give \(3,\), and it has the shape \(3, 4\)"
+        vcc.InputError, match=r"constraints of code.pattern return \(3,\), but it has the shape \(3, 4\)"
     ):
         module(constraints={"code.pattern": lambda cells: cells[:, 0]})()
 

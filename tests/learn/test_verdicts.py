@@ -25,9 +25,9 @@ def page():
         ("lens", "main.diameter", "footprints", "exact", ""),
         ("polygon", "code.pattern.rotation", "footprints", "exact", ""),
         ("polygon", "code.pattern.rotation", "rays", "smoothed", "its edges are those of a texture"),
-        ("mask of cells", "code.width", "rays", "refused", "against a border between cells of mask"),
+        ("mask of cells", "code.width", "rays", "refused", "across a border between cells of mask"),
         ("mask of cells", "code.pattern", "rays", "exact", ""),
-        ("biprism", "pair.rotation", "rays", "refused", "against a border between facets"),
+        ("biprism", "pair.rotation", "rays", "refused", "across a border between facets"),
         ("biprism", "pair.rotation", "footprints", "refused", "bends rays by a function of position"),
     ],
 )

@@ -152,8 +152,8 @@ def test_draws_on_axes_that_are_given():
     ("options", "message"),
     [
         ({"across": "x"}, 'across is "u" or "v"'),
-        ({"row": 3}, "row is 3, and there are 3"),
-        ({"pixel_row": -5}, "pixel_row is -5, and there are 4"),
+        ({"row": 3}, "row is 3, but there are 3"),
+        ({"pixel_row": -5}, "pixel_row is -5, but there are 4"),
     ],
 )
 def test_refuses(options, message):
@@ -358,7 +358,7 @@ def test_pictures_of_places_and_of_slopes_are_upright():
         ({"across": "uu"}, "or two of u, v, s and t"),
         ({"across": "uv", "row": 1}, r"fixed=\(s, t\)"),
         ({"across": "us", "fixed": (0.0, 0.0), "pixel_row": 1}, r"fixed=\(v, t\)"),
-        ({"across": "uv", "fixed": (0.1,)}, "fixed is two numbers, s and t"),
+        ({"across": "uv", "fixed": (0.1,)}, "fixed must be two numbers, s and t"),
         ({"across": "uv", "fixed": (5.0, 0.0)}, "holds no rays of s = 5 and t = 0"),
     ],
 )
@@ -371,7 +371,7 @@ def test_refuses_a_diffuser_in_a_slice_that_it_leads_out_of():
     camera = Camera([Diffuser(kernel=Gaussian(0.1), name="frost")], sensor(1 * mm))
     with pytest.raises(InputError, match='diffuser "frost" scatters light out of the slice "uv"'):
         plot_phase_space_stages(camera, some_light_field(), across="uv")
-    with pytest.raises(InputError, match="rays is a number from 1 on"):
+    with pytest.raises(InputError, match="rays must be 1 or more"):
         phase_space_stages(camera, some_light_field(), rays=0)
 
 

@@ -368,7 +368,7 @@ TWO = np.full((2, 8, 9), 0.5)
         (lambda: wiener(PICTURE, LOPSIDED, 0.1, contrast=0), "contrast of the prior must be greater than 0"),
         (lambda: richardson_lucy(-PICTURE, LOPSIDED), "goes down to -0.5"),
         (lambda: richardson_lucy(PICTURE, LOPSIDED, iterations=0), "1 or more, not 0"),
-        (lambda: richardson_lucy(PICTURE, LOPSIDED, tolerance=np.nan), "tolerance is 0 or more"),
+        (lambda: richardson_lucy(PICTURE, LOPSIDED, tolerance=np.nan), "tolerance must be 0 or more"),
         (lambda: richardson_lucy(PICTURE, LOPSIDED, memory_limit=100), "100 bytes are allowed.*memory_limit"),
         (lambda: sparse_gradients(PICTURE, LOPSIDED, 0), "above 0, in the recording's unit, not 0"),
         (lambda: sparse_gradients(PICTURE, LOPSIDED, 0.1, exponent=0), "must be greater than 0 and at most 2"),

@@ -62,7 +62,7 @@ def recording() -> np.ndarray:
     return values / values.mean()
 
 
-AT_ENDS = "ignore:of the blocks, by confidence, .* of the candidates explains best:vcc.ResultWarning"
+AT_ENDS = "ignore:of the blocks, by confidence, .* of the candidates fits best:vcc.ResultWarning"
 
 
 def test_blocks_that_take_the_last_candidate_may_lie_beyond(recording: np.ndarray) -> None:
@@ -187,7 +187,7 @@ K = [np.full((n, n), 1 / n**2) for n in (3, 5)]
         (np.ones((90, 90)), K[:1], {}, "two candidates or more"),
         (np.ones((90, 90)), [K[0], 2 * K[1]], {}, "of sum 1"),
         (np.ones((90, 90)), K, {"noise": 0}, "noise must be greater than 0"),
-        (np.ones((90, 90)), K, {"block": 2}, "block is 4 pixels or more"),
+        (np.ones((90, 90)), K, {"block": 2}, "block must be 4 pixels or more"),
         (np.ones((90, 90)), K, {"block": 4}, "largest kernel has 5 pixels"),
         (np.ones((90, 90)), K, {"memory_limit": 1000}, "1000 bytes are allowed.*memory_limit"),
     ],

@@ -181,7 +181,7 @@ def test_smoothing_without_sense_is_refused(options):
         9,
         (2.0, 1.0),
     )
-    with pytest.raises(vcc.InputError, match="cost is greater than 0"):
+    with pytest.raises(vcc.InputError, match="cost must be greater than 0"):
         found.smoothed(**options)
     found.smoothed(cost=0.5, outliers=0.9, sweeps=1)
 

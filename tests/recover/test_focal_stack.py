@@ -173,7 +173,7 @@ STACK = halves()
     [
         (lambda: focus_distances(2.0, 1.0, 3), "exchange them"),
         (lambda: focus_distances(0.0, 1.0, 3), "greater than 0 m"),
-        (lambda: focus_distances(1.0, 2.0, 2.5), "a whole number of pictures"),
+        (lambda: focus_distances(1.0, 2.0, 2.5), "must be an integer"),
         (lambda: focal_stack(vcc.LightField.from_views(np.ones((1, 1, 4, 4)), 1e-3, 0.01), ()), "at least one"),
         (
             lambda: focal_stack(
@@ -185,7 +185,7 @@ STACK = halves()
         (lambda: FocalStack(STACK.pictures[0], (1.0,), STACK.frame), "has the axes"),
         (lambda: FocalStack(STACK.pictures * np.float32(np.nan), (1.0, 2.0), STACK.frame), "finite samples"),
         (lambda: STACK.all_in_focus(window=0), "window must be greater than 0 pixels"),
-        (lambda: STACK.all_in_focus(selectivity=-1), "selectivity is 0 or more"),
+        (lambda: STACK.all_in_focus(selectivity=-1), "selectivity must be 0 or more"),
         (lambda: STACK.all_in_focus(memory_limit=10), "10 bytes are allowed.*memory_limit"),
         (lambda: STACK.save("stack.avi"), "end its name in .mp4, .gif"),
         (lambda: STACK.save("stack.gif", frames_per_second=60), "up to 50, not 60"),

@@ -273,7 +273,7 @@ OTHER_PITCH = LensletGrid("square", (0, 0), ((10, 0), (0, 10)))
             lambda raw, camera: decode_plenoptic(raw, camera=camera, white=np.ones((150, 153))),
             "the white image is 150×153",
         ),
-        (lambda raw, camera: decode_plenoptic(raw), "not known"),
+        (lambda raw, camera: decode_plenoptic(raw), "are unknown"),
         (lambda raw, camera: decode_plenoptic(raw, OTHER_PITCH, camera=camera), "not of this camera"),
         (lambda raw, camera: decode_plenoptic(raw, camera=camera, views=11), "do not fit into micro-images"),
         (lambda raw, camera: decode_plenoptic(raw, camera=camera, views=0), "one whole number or"),

@@ -231,7 +231,7 @@ FIELD = grating(1 * m, 3, 16)
         (lambda: refocused(FIELD, float("nan")), "distance must be greater than 0 m"),
         (lambda: refocused(FIELD, 1, diameter=-1), "diameter of the aperture must be greater than 0 m, not -1"),
         (lambda: refocused(FIELD, 1, centre=(1e-3, 0)), "give its diameter too"),
-        (lambda: refocused(FIELD, 1, diameter=1e-3, centre=(0.1, 0)), "lies beside all views"),
+        (lambda: refocused(FIELD, 1, diameter=1e-3, centre=(0.1, 0)), "is outside all views"),
         (lambda: refocused(FIELD.transformed(vcc.Affine.propagation(1.0)), 1.0), "nothing can"),
         (lambda: novel_view(FIELD, 0.1, 0), r"u = 0.1 m lies outside the views, which stand from -0.002 m to"),
         (lambda: novel_view(FIELD, 0, float("nan")), "v = nan m lies outside the views"),
@@ -241,7 +241,7 @@ FIELD = grating(1 * m, 3, 16)
             lambda: novel_view(
                 vcc.LightField.from_views(np.ones((2, 2, 6, 6)), SPACING, SLOPE), 0.2 * mm, 0.1 * mm
             ),
-            "give scene_distance=",
+            "pass scene_distance=",
         ),
         (
             lambda: novel_view(

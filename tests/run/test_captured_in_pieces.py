@@ -198,7 +198,7 @@ def test_blocks_keep_to_the_limit(tmp_path, method):
     )
     with ThreadPoolExecutor(3) as pool:
         assert drive.Drive(plan, stored, How(threads=2), pool).blocks == blocks  # so that pictures are the same
-    with pytest.raises(vcc.InputError, match="is too little: this picture takes"):
+    with pytest.raises(vcc.InputError, match="is too little: this image needs"):
         _ = driven(fixed).blocks
 
 

@@ -66,12 +66,12 @@ def test_what_workers_lack_is_told(client, stored, monkeypatch):  # noqa: F811
     assert worker_pool(client).places == 2
     assert worker_pool(client).memory == pytest.approx(0.7 * 2e9 - 4e8, rel=1e-3)
     with pytest.raises(
-        vcc.InputError, match=r"has 1000 MB for each task, .* and 1500 MB are asked for: give workers"
+        vcc.InputError, match=r"has 1000 MB for each task, .* and 1500 MB are required: give workers"
     ):
         CAMERAS["fine mask"][0].capture(stored, executor=client, memory_limit=1_500_000_000)
-    for version, words in (("0.0.1", "version 0.0.1 of the package"), (None, "none of the package")):
+    for version, words in (("0.0.1", "version 0.0.1 of the package"), (None, "no version of the package")):
         monkeypatch.setattr(executors.pydoc, "locate", lambda _, found=version: found)  # sent as it is
-        with pytest.raises(vcc.InputError, match=f"the worker tcp://.* has {words}, and what sends the work has"):
+        with pytest.raises(vcc.InputError, match=f"the worker tcp://.* has {words}, and the sender has"):
             CAMERAS["fine mask"][0].capture(stored, executor=client)
 
 
@@ -149,7 +149,7 @@ def test_a_view_that_is_missing_is_named(client, tmp_path, monkeypatch):
 
 def test_a_task_that_kills_all_workers_is_told(client):
     client.cluster.scheduler.allowed_failures = 0
-    with pytest.raises(vcc.InputError, match=r"ended each of the workers that took it.* Pass memory_limit="):
+    with pytest.raises(vcc.InputError, match=r"killed each worker that ran it.* Pass memory_limit="):
         list(worker_pool(client).each(Work(kill, None), [0]))
 
 
@@ -188,7 +188,7 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
         }[ends]
         with pytest.raises(expected, match=words):
             worker_pool(client).summed(Work(sleep, None), range(100), joined, told)
-    with pytest.raises(vcc.InputError, match="connect anew"):
+    with pytest.raises(vcc.InputError, match="reconnect with"):
         worker_pool(client)
 
 

@@ -148,17 +148,17 @@ def test_noise_copies_and_pickles():
 def test_what_is_no_tensor_for_it_is_refused():
     physics = operator(3, engine="numba").as_deepinv()
     refused = {
-        "samples are tensors of floating-point numbers here, not ndarray": np.ones((1, 3, *SHAPE)),
-        "samples are tensors of floating-point numbers here, not torch.uint8": torch.ones((1, 3, *SHAPE)).byte(),
-        "samples are on meta, and this physics is computed on the CPU": torch.ones((1, 3, *SHAPE), device="meta"),
-        "(batch, channels, …), (B, 3, 2, 3, 7, 8) here, not (1, 2, 3, 7, 8, 3)": torch.ones((1, *SHAPE, 3)),
+        "samples must be floating-point tensors, not ndarray": np.ones((1, 3, *SHAPE)),
+        "samples must be floating-point tensors, not torch.uint8": torch.ones((1, 3, *SHAPE)).byte(),
+        "samples are on meta, but this physics runs on the CPU": torch.ones((1, 3, *SHAPE), device="meta"),
+        "(batch, channels, …), here (B, 3, 2, 3, 7, 8), not (1, 2, 3, 7, 8, 3)": torch.ones((1, *SHAPE, 3)),
         "not (0, 3, 2, 3, 7, 8)": torch.ones((0, 3, *SHAPE)),
     }
     for said, samples in refused.items():
         with pytest.raises(vcc.InputError) as error:
             physics(samples)
         assert said in str(error.value)
-    with pytest.raises(vcc.InputError, match=r"pictures have the shape"):
+    with pytest.raises(vcc.InputError, match=r"pictures must have the shape"):
         physics.A_adjoint(torch.ones((1, 3, 5, 5)))
     with pytest.raises(vcc.InputError, match="scale must be greater than 0"):
         operator(engine="numba").as_deepinv(scale=0)

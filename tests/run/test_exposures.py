@@ -271,7 +271,7 @@ def test_radiances_that_are_none(radiance):
     [
         (picture(0, sensor()), sensor(), "auto", "picture is black"),
         (picture(np.nan, sensor()), sensor(), 1e-3, "not finite"),
-        (picture(1, sensor()).upright(), sensor(), 1e-3, "not upright"),
+        (picture(1, sensor()).upright(), sensor(), 1e-3, "image is upright"),
         (picture(1, sensor(shape=(3, 4))), sensor(), 1e-3, "64, 96"),
         (picture(1, sensor()), sensor(None), 1e-3, r"electronics=vcc\.Electronics"),
     ],
@@ -418,7 +418,7 @@ def test_demosaicing_that_cannot_be(monkeypatch):
     with pytest.raises(vcc.InputError, match=r"image\(\)"):
         grey.demosaiced()
     tiny = sensor(dataclasses.replace(QUIET, color_filter=XTRANS), (8, 5))
-    with pytest.raises(vcc.InputError, match="whole tile"):
+    with pytest.raises(vcc.InputError, match="smaller than a tile"):
         vcc.expose_image(picture((1, 1, 1), tiny), tiny, "auto").demosaiced()
     monkeypatch.setitem(sys.modules, "colour_demosaicing", None)
     with pytest.raises(vcc.InputError, match=r"virtual-computational-camera\[demosaic\]"):
@@ -665,7 +665,7 @@ def test_a_mosaic_that_just_holds_a_tile_is_filled_and_a_smaller_one_refused():
         behind = Electronics(color_filter=tile)
         assert demosaic(np.ones((high, wide), np.float32), behind, "bilinear").min() == pytest.approx(1)
         for shape in ((high - 1, wide), (high, wide - 1)):
-            with pytest.raises(vcc.InputError, match=f"does not hold a whole tile of .*{high}×{wide}"):
+            with pytest.raises(vcc.InputError, match=f"is smaller than a tile of .*{high}×{wide}"):
                 demosaic(np.ones(shape, np.float32), behind, "bilinear")
 
 

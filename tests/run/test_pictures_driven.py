@@ -240,7 +240,7 @@ def test_rays_end_where_their_table_does_and_it_is_said():
     given = light_field()
     optics = replace(camera(LENSLETS), sensor=replace(SENSOR, shape=(1, 2)))
     plan = optics.compile(given, samples=2**13)
-    with pytest.warns(vcc.ResultWarning, match=r"after 65536 rays a pixel, the most there are; 1e-09 was asked"):
+    with pytest.warns(vcc.ResultWarning, match=r"after 65536 rays per pixel, the maximum; the tolerance is 1e-09"):
         found = drive(plan, given, How(tolerance=1e-9))
     assert found.samples == 2**16
     with pytest.raises(vcc.InputError, match="footprints have no sampling error"):
@@ -329,7 +329,7 @@ def test_much_that_no_view_shows_is_said(hidden, said):
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         drive(plan, given)
-    assert any("of the samples between views show what none" in str(each.message) for each in told) == said
+    assert any("of the samples between views are visible in none" in str(each.message) for each in told) == said
 
 
 # --- pieces of light fields ---

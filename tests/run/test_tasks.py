@@ -67,9 +67,9 @@ class AtOnce(Executor):
         (10**8, 10**9, 10**8),
         (10**9, 10**9, 10**9),
         (1000, 2**26, 1000),
-        (None, 2**26 - 1, "67 MB for each task, .* and 67 MB are asked for: give workers more memory, or fewer"),
+        (None, 2**26 - 1, "67 MB for each task, .* and 67 MB are required: give workers more memory, or fewer"),
         (1000, 2**26 - 1, "67 MB for each task"),
-        (10**9 + 1, 10**9, "1000 MB for each task, .* and 1000 MB are asked for.*, or pass a smaller limit"),
+        (10**9 + 1, 10**9, "1000 MB for each task, .* and 1000 MB are required.*, or pass a smaller limit"),
         (None, -3e8, "has 0 MB for each task"),
     ],
 )
@@ -107,7 +107,7 @@ def test_the_room_of_a_cluster_is_that_of_its_least_worker():
     with pytest.raises(vcc.InputError, match="asynchronous=True"):
         worker_pool(made)
     del made.nthreads
-    with pytest.raises(vcc.InputError, match=r"executor is a concurrent\.futures\.Executor"):
+    with pytest.raises(vcc.InputError, match=r"executor must be a concurrent\.futures\.Executor"):
         worker_pool(made)
 
 
@@ -202,7 +202,7 @@ class Cancelling(AtOnce):
 
 
 def test_work_that_is_cancelled_is_told():
-    with pytest.raises(vcc.InputError, match="executor cancelled work that was not done") as error:
+    with pytest.raises(vcc.InputError, match="executor cancelled unfinished tasks") as error:
         list(Pool(Cancelling()).each(Work(times, 1.0), [1, 2]))
     assert isinstance(error.value.__cause__, CancelledError)
 
@@ -352,7 +352,7 @@ def test_a_cluster_without_workers_is_waited_for_and_it_is_said():
 
 
 def test_what_workers_have_is_asked_before_work():
-    for version, words in (("0.1", "version 0.1 of the package"), (None, "none of the package")):
+    for version, words in (("0.1", "version 0.1 of the package"), (None, "no version of the package")):
         with pytest.raises(vcc.InputError, match=f"worker tcp://0 has {words}"):
             list(worker_pool(Client(version=version)).each(Work(marked, "!"), "ab"))
     # What a worker raises when it is asked is no version: it may be busy.
@@ -383,7 +383,7 @@ def test_what_is_not_done_is_cancelled_when_work_ends(verb):
     client, _ = ended({5: "pending", 7: "pending"}, ZeroDivisionError)
     assert [future.status for future in client.cancelled] == ["pending"] * 2
     client, error = ended({0: "cancelled", 5: "pending"}, vcc.InputError)
-    assert "or the work cancelled, before it was done" in str(error)
+    assert "or the tasks were cancelled, before they finished" in str(error)
     assert [future.status for future in client.cancelled] == ["pending"]
     client, _ = ended({5: "pending", 7: "pending"}, ZeroDivisionError, "closed")
     assert client.cancelled == []

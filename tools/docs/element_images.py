@@ -197,8 +197,7 @@ def mask() -> tuple[Figure, Figure]:
 
 
 def angle_filter() -> tuple[Figure, Figure]:
-    """A louvre from the side, transmissions against the angle, and an image through a louvre and through a "
-    "filter."""
+    """A louvre from the side, transmissions against the angle, and images through both elements."""
     louvre = vcc.Louvre(pitch=0.5 * mm, height=1.6 * mm, wall=0.05 * mm, z=46 * mm)
     fringes = vcc.AngleFilter(vcc.patterns.AngularFringes(frequency=60), z=46 * mm)
     figure = panels.new_figure(11, 3.0)

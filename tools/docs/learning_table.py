@@ -45,7 +45,7 @@ def in_words(found: Verdict) -> str:
         return "exact"
     if re.search(BY_RAYS, found.why):
         return "by rays only"
-    edges = re.search(r"moves rays against (.*), a hard edge inside", found.why)
+    edges = re.search(r"moves rays across (.*), a hard edge that", found.why)
     if edges:
         if "which kernel" in edges[1]:
             return "refused: which kernel is picked jumps"

@@ -1,1 +1,1 @@
-"""A camera and a plan in words: what was folded and chosen, what samples hold, what a picture lacks and costs."""
+"""Explanations and warnings as text: the choices of a plan, sampling limits, and what limits an image."""

@@ -1,4 +1,4 @@
-"""The light field that a camera asks for: it fills the opening, as fine as pixels and depths need."""
+"""The light field that a camera needs: it fills the opening, as fine as pixels and depths require."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from vcc.optics.train import Train
 Array = NDArray[np.float64]
 
 MOST_VIEWS = 100_000
-"""A side, of a light field that is asked for: beyond, the depths given are wrong."""
+"""Largest number of views per side: beyond it, the given depths are assumed to be wrong."""
 
 
 def asked_for(train: Train, vergences: tuple[float, float], views: Any = None) -> Grid:
-    """The grid of the light field that a camera of lenses and prisms asks for.
+    """The grid of the light field that a camera of lenses and prisms needs.
 
-    Its samples are as wide as a pixel on the sensor, and its views fill the opening.
+    Its samples have the width of a pixel on the sensor, and its views fill the opening.
 
     Args:
-        train: with something that bounds its light.
+        train: with at least one stop.
         vergences: 1/Z of the (farthest, nearest) part of the scene, 1/m.
-        views: (rows, columns); None takes as many as make neighbouring views' pictures lie a pixel apart.
+        views: (rows, columns); None uses as many as keep neighbouring views' images at most one pixel apart.
 
     Raises:
-        InputError: a camera without a stop, one that bends light otherwise than by lenses and prisms, one whose
-            sensor sees no slopes, views that are no whole numbers, or more of them needed than make sense.
+        InputError: a camera without a stop, or with elements other than lenses and prisms that bend light; a
+            sensor that no slope reaches, views that are not integers, or an unreasonable number of views.
     """
     _check_known(train)
     matrix = train.arriving_at_sensor.linear
@@ -67,7 +67,7 @@ def _check_known(train: Train) -> None:
 
 
 def _opening(train: Train, axis: int, vergences: tuple[float, float]) -> float:
-    """How wide at the entrance plane the light of points at these 1/Z is that every stop lets in, metres."""
+    """Width at the entrance plane of the light that all stops pass, for points at these 1/Z, metres."""
     widths = []
     for stage in train.stages:
         if stage.faces.pattern is not None and math.isfinite(size := stage.faces.pattern.size[axis]):
@@ -81,7 +81,7 @@ def _opening(train: Train, axis: int, vergences: tuple[float, float]) -> float:
 
 
 def _needed(pixels_per_metre: Array, width: float, height: float) -> tuple[int, int]:
-    """(rows, columns) of views whose pictures lie a pixel apart at most."""
+    """(rows, columns) of views whose images are at most one pixel apart."""
     columns, rows = (max(1, enough(float(gap))) for gap in pixels_per_metre * (width, height))
     if max(rows, columns) > MOST_VIEWS:
         raise InputError(

@@ -1,6 +1,6 @@
-"""A plan in words: what was folded, what was pulled to the sensor, which sampling was chosen, what it costs.
+"""A plan as text: how it folds the optics, what it moves to the sensor, the chosen sampling, and the cost.
 
-And what a light field on disk and an executor add to that.
+For a light field on disk and an executor, with additional sections.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from vcc.run.required_samples import required_samples
 from vcc.run.serialization import PortableRun
 
 COLUMNS = 80
-"""Into which an explanation's lines fit, but for words that are longer."""
+"""Largest width of a line, except for longer words."""
 PLACES_END = 20
-"""The column at which an element's words begin, behind its place on the axis."""
+"""The column at which an element's description begins, after its position on the axis."""
 
 
 class Explanation(Shown, str):
-    """Text that shows itself plainly in a notebook or on the command line."""
+    """Text whose `repr` is the text itself, in a notebook or on the command line."""
 
     __slots__ = ("expected_seconds", "expected_seconds_by_executor", "plan")
     plan: Plan
@@ -47,16 +47,16 @@ class Explanation(Shown, str):
 
 
 def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: Any = None) -> Explanation:
-    """A plan for a light field in words; see `vcc.Camera.explain`.
+    """A plan for a light field as text; see `vcc.Camera.explain`.
 
     The time is estimated by running a part of the plan on the light field and scaling it up.
 
     Args:
-        train: that the plan was made of.
-        samples: that it was made for.
-        plan: what is explained.
-        how: what was chosen.
-        executor: that may run the blocks, or None.
+        train: of the plan.
+        samples: of the plan.
+        plan: to explain.
+        how: the settings.
+        executor: may run the blocks, or None.
     """
     run = Drive(plan, samples, how)
     room = explain_rays if plan.by_rays else explain_footprints
@@ -77,11 +77,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
 
 
 def wrapped(text: str) -> str:
-    """Text whose lines fit a terminal: what is longer goes on in the next line, further to the right."""
+    """Text wrapped to the width of a terminal, with further indentation of continued lines."""
     lines = []
     for line in text.split("\n"):
         indent = len(line) - len(line.lstrip())
-        # A quantity stays in one piece.
+        # Keep a number and its unit on one line.
         whole = re.sub(
             r"z = (?=[-\d])", "z\xa0=\xa0", re.sub(r"(?<=\d) (?=(?:[mun]?m|s|MB|pixels)\b)", "\xa0", line)
         )
@@ -124,15 +124,15 @@ def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:
     return "What the samples can carry\n" + in_words(sampling_limits(train, grid, scene))
 
 
-# --- what a light field on disk, and an executor, add: blocks, time, whether it is worth it ---
+# --- sections for a light field on disk and for an executor: blocks, time, recommendation ---
 
 
 WORTH_IT = 0.8
-"""Of the time here, which an executor must take less than to be worth its trouble."""
+"""An executor is recommended if it takes less than this share of the local time."""
 
 
 def _traced_for(run: Drive) -> str:
-    """For which blocks rays are traced, as text."""
+    """The blocks for which rays are traced, as text."""
     if run.need.bands > 1 and run.blocks.pixel_rows_each < run.blocks.pixel_rows:
         return "rays are traced for the blocks that they look at"
     return "all rays are traced once for each block"
@@ -142,7 +142,7 @@ def of_store(run: Drive) -> tuple[str, float | None]:
     """The section of `vcc.Camera.explain`, and the seconds expected.
 
     Args:
-        run: of which a few views are read, to estimate the time.
+        run: reads a few views to estimate the time.
     """
     lines = [f"  read in {run.blocks.words}", f"  {run.given.stored_bytes / 1e6:.0f} MB on disk, as packed"]
     if run.plan.by_rays:
@@ -157,8 +157,8 @@ def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
     """The section of `vcc.Camera.explain`, and the seconds expected.
 
     Args:
-        run: by an executor, which runs a few views to estimate the time.
-        here: seconds that all takes without it; None where that is not estimated.
+        run: with an executor, which runs a few views to estimate the time.
+        here: seconds without the executor; None if not estimated.
     """
     assert run.worker_pool is not None
     blocks, places = len(list(run.blocks)), run.worker_pool.places
@@ -178,11 +178,11 @@ def of_executor(run: Drive, here: float | None) -> tuple[str, float | None]:
 
 
 def expected_seconds(run: Drive, blocks: int, places: int) -> float:
-    """How long an executor will take: it begins, runs some views and gives a raster back, and each is timed.
+    """The estimated run time with an executor, from timings of its start, some views and a returned raster.
 
     Args:
-        run: by the executor.
-        blocks: how many there are.
+        run: with the executor.
+        blocks: number of blocks.
         places: how many run at once.
     """
     block, share = some_views(run)
@@ -203,7 +203,7 @@ def _ask(run: Drive, blocks: Sequence[Block], first: bool = False) -> list[float
 
 
 def _seconds(sent: PortableRun, block: Block) -> tuple[float, Any]:
-    """How long a block takes where this runs, and its raster, so that it is sent."""
+    """The run time of a block on this machine, and its raster, so that its transfer is included."""
     drive = Drive(sent.plan, sent.samples, sent.how)
     start = time.perf_counter()
     part = drive.part(block, 0, Counted(None, 0))

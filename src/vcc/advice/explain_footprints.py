@@ -1,4 +1,4 @@
-"""A plan by footprints in words: how it samples, what it costs, what to beware of."""
+"""A plan by footprints as text: sampling, cost, warnings."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from vcc.plan.operators import AlongAxes, Blur, BlurViews
 from vcc.run.drive import IN_MEMORY, Drive
 
 TAPS_VALUES, TAPS_VALUES_BETWEEN = 1e8, 1e7
-"""Sample values whose own time stands out from the clock's noise; views in between take ten times as long."""
+"""Number of sample values for a reliable timing; a tenth with interpolated views, which are slower."""
 
 
 def sections(run: Drive) -> tuple[list[str], float | None]:
-    """The sections of `vcc.Camera.explain` after how the picture is made, and the seconds expected."""
+    """The sections of `vcc.Camera.explain` after "How the image is made", and the estimated seconds."""
     core = run.plan.core
     assert isinstance(core, Footprints)
     seconds = expected_seconds(run) if run.given.whole() is not None else None
@@ -57,7 +57,7 @@ def _sampling(plan: Plan, core: Footprints) -> str:
 
 
 def _interpolation(plan: Plan, core: Footprints) -> str:
-    """How values between samples are found, and what that takes given back, in words."""
+    """The interpolation within a view and the filter that sharpens after it, as text."""
     by = {"spline": "cubic splines"}.get(core.interpolation, core.interpolation)
     for operator in plan.after:
         if isinstance(operator, AlongAxes) and not any(operator.half_widths):
@@ -83,9 +83,9 @@ def _cost(run: Drive, core: Footprints, seconds: float | None) -> str:
 
 
 def _memory(run: Drive) -> int:
-    """Bytes that a run takes beside the light field and the picture, estimated."""
+    """Estimated memory of a run besides the light field and the image, bytes."""
     grid = run.given.grid
-    # One column of views is blurred at a time.
+    # Only one column of views is blurred at a time.
     copies = any(operator.copies for operator in run.plan.before)
     blurred = 4 * grid.shape[0] * math.prod(run.plan.shape(grid.shape)[2:]) if copies else 0
     between = 0 if run.plan.views_between is None else IN_MEMORY
@@ -101,9 +101,9 @@ def _warnings(plan: Plan) -> str:
 
 
 def expected_seconds(run: Drive) -> float | None:
-    """How long a run will take: some columns of view taps are run and timed, then scaled up.
+    """The estimated run time: some columns of view taps are timed, and the time is scaled up.
 
-    None where the samples cannot be run (an array under a tracer).
+    None if the samples have no values (an array under a tracer).
     """
     core = run.plan.core
     assert isinstance(core, Footprints)
@@ -116,7 +116,7 @@ def expected_seconds(run: Drive) -> float | None:
     share = max(1 / 16, min(1.0, enough / (core.samples_touched * run.channels)))
     columns = np.sort(np.argsort(-used)[: math.ceil(len(used) * share)])
     piece = core.of_columns(columns)
-    # What a run costs whatever it adds up.
+    # The constant part of the run time.
     nothing = replace(piece, weights=np.zeros_like(piece.weights))
 
     def least_seconds(core: Any) -> float:
@@ -128,14 +128,14 @@ def expected_seconds(run: Drive) -> float | None:
 
 
 def seconds_from_store(run: Drive) -> float:
-    """How long reading and running will take: some views of a row are read and run, then scaled up."""
+    """The estimated time to read and run: some views of a row are timed, and the time is scaled up."""
     block, share = some_views(run)
     seconds = min(_timed(lambda: run.summed([block])) for _ in range(2))  # the first run may compile
     return seconds / share
 
 
 def some_views(run: Drive) -> tuple[Block, float]:
-    """Up to eight views of a row, and the share that they are of all that are looked at."""
+    """Up to eight views of a row, and their share of all used views."""
     shape = run.samples.grid.shape
     used = run.core.used_views(shape)
     row = int(np.argmax(used.sum(axis=1)))

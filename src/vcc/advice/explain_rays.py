@@ -1,4 +1,4 @@
-"""A plan by rays in words: how it samples, what it costs, what to beware of."""
+"""A plan by rays as text: sampling, cost, warnings."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from vcc.plan.rays.model import Rays
 from vcc.run.drive import Drive, sampling_error
 
 PATCH = 32
-"""Pixels a side, and for each thread, of the pieces of the picture that are traced to estimate time and error."""
+"""Pixels per side (times the threads along rows) of the pieces of the image that estimate time and error."""
 PLACES = (0.1, 0.5, 0.9)
-"""Where they lie along each axis, as a share of the sensor's size."""
+"""Positions of the pieces along each axis, as a share of the sensor's size."""
 
 
 @dataclass(frozen=True)
 class _Pilot:
-    """What pieces of the picture estimate of all of it.
+    """Estimates for the whole image from some pieces.
 
     Args:
         seconds: of a run.
-        rays: that are traced.
-        error: from sampling, as a share of the picture's mean.
-        decibels: of the brightest pixel over that error.
+        rays: number of rays.
+        error: sampling error, as a share of the image's mean.
+        decibels: ratio of the brightest pixel to that error.
     """
 
     seconds: float
@@ -40,7 +40,7 @@ class _Pilot:
 
 
 def sections(run: Drive) -> tuple[list[str], float | None]:
-    """The sections of `vcc.Camera.explain` after how the picture is made, and the seconds expected."""
+    """The sections of `vcc.Camera.explain` after "How the image is made", and the estimated seconds."""
     core = run.core
     assert isinstance(core, Rays)
     pilot = _pilot(run, core)
@@ -49,7 +49,7 @@ def sections(run: Drive) -> tuple[list[str], float | None]:
 
 
 def _pilot(run: Drive, core: Rays) -> _Pilot | None:
-    """What tracing pieces of the picture estimates; None where the samples cannot be run, or are not in memory."""
+    """Estimates from tracing pieces of the image; None if the samples have no values, or are not in memory."""
     whole = run.samples.whole()
     if whole is None or not has_values(whole):
         return None
@@ -82,7 +82,7 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
 
 
 def _patches(core: Rays, threads: int) -> Iterator[Rays]:
-    """Pieces of the sensor, evenly placed; neighbouring pixels look at neighbouring samples and stay together."""
+    """Evenly placed pieces of the sensor; neighbouring pixels share samples and stay together."""
     rows, columns = min(core.raster_shape[0], PATCH), min(core.raster_shape[1], PATCH * threads)
     for down in PLACES:
         for across in PLACES:
@@ -122,7 +122,7 @@ def _cost(run: Drive, core: Rays, pilot: _Pilot | None) -> str:
 
 
 def _memory(run: Drive, core: Rays) -> int:
-    """Bytes that a run takes beside the light field and the picture, estimated."""
+    """Estimated memory of a run besides the light field and the image, bytes."""
     whole, copied = run.samples.whole(), 0
     if isinstance(whole, np.ndarray):
         in_parts = not isinstance(run.taken, np.ndarray)

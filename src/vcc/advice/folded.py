@@ -1,4 +1,4 @@
-"""A camera seen from a light field as matrices: where rays go, as far as matrices hold."""
+"""A camera and a light field as ray matrices, as far as matrices are exact."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Folded:
-    """An optical train and a light field before it, as matrices.
+    """An optical train and a light field before it, as ray matrices.
 
     Args:
         train: any.
@@ -34,12 +34,12 @@ class Folded:
 
     @property
     def frame(self) -> Affine:
-        """Of the light field."""
+        """Frame of the light field."""
         return self.grid.frame
 
     @property
     def views(self) -> tuple[int, int]:
-        """(rows, columns)."""
+        """(rows, columns) of views."""
         return self.grid.shape[0], self.grid.shape[1]
 
     @property
@@ -52,44 +52,44 @@ class Folded:
         """The sensor's smaller pitch, metres."""
         return min(self.train.sensor.pitches)
 
-    # -- as far as matrices hold
+    # -- as far as matrices are exact
 
     @property
     @cached
     def blocking(self) -> Stage | None:
-        """The first stage behind which matrices do not hold."""
+        """The first stage behind which matrices are not exact; None if there is none."""
         return next((stage for stage in self.train.stages if ends_matrices(stage)), None)
 
     @property
     @cached
     def reached(self) -> tuple[Stage, ...]:
-        """The stages whose ``arriving`` is exact: up to the one that blocks."""
+        """The stages whose ``arriving`` is exact: up to and including the blocking one."""
         stages = self.train.stages
         return stages if self.blocking is None else stages[: stages.index(self.blocking) + 1]
 
     @property
     def to_sensor(self) -> Affine:
-        """Rays from the entrance plane to the sensor; exact where nothing blocks."""
+        """Map of rays from the entrance plane to the sensor; exact if no stage blocks."""
         return self.train.arriving_at_sensor
 
     @property
     def sensor_from_slope(self) -> Array:
-        """2×2: place on the sensor per slope at the entrance plane, metres."""
+        """2×2: position on the sensor per slope at the entrance plane, metres."""
         return self.to_sensor.linear[:2, 2:]
 
     def onwards(self, stage: Stage) -> Affine | None:
-        """Rays from just before a stage to the sensor, itself as if at its middle; None where not affine."""
+        """Map of rays from just before a stage to the sensor, for the stage's centre; None if not affine."""
         behind = self.train.stages[self.train.stages.index(stage) + 1 :]
         if stage not in self.reached or any(map(ends_matrices, behind)):
             return None
         return self.to_sensor @ stage.arriving.inverse()
 
-    # -- of what is seen
+    # -- the scene
 
     @property
     @cached
     def looked_at(self) -> float:
-        """1/Z of what is followed from view to view: what is in focus, or as near to that as the scene is."""
+        """1/Z of the points followed between views: in focus, or the part of the scene nearest to focus."""
         by_place, by_slope = self.to_sensor.linear[:2, :2], self.sensor_from_slope
         square = float((by_slope**2).sum())
         focus = -float((by_place * by_slope).sum()) / square if square > 0 else 0.0
@@ -99,7 +99,7 @@ class Folded:
     @property
     @cached
     def gaps(self) -> ViewGaps | None:
-        """Between neighbouring views' pictures on the sensor; None where something blocks."""
+        """Distances on the sensor between images of neighbouring views; None if a stage blocks."""
         if self.blocking is not None:
             return None
         vertical, horizontal = self.train.sensor.pitches
@@ -109,14 +109,14 @@ class Folded:
     @property
     @cached
     def free_of_ghosts(self) -> tuple[float, float] | None:
-        """(near, far) before the entrance plane between which no gap is seen, metres; None where there is none."""
+        """(near, far) before the entrance plane, the range without visible gaps, metres; None if there is none."""
         free = None if self.gaps is None else self.gaps.free_of_ghosts()
         return None if free is None or free[1] <= 0 else (1 / free[1], distance_of(max(free[0], 0.0)))
 
     @property
     @cached
     def stop(self) -> float | None:
-        """Half the width at the entrance plane of what stops let in of a point in focus, metres; None for all."""
+        """Half the width at the entrance plane that stops pass for a point in focus, metres; None if all."""
         widths = []
         for stage in self.reached:
             if stage.faces.pattern is None:
@@ -129,12 +129,12 @@ class Folded:
 
     @property
     def views_let_in(self) -> tuple[int, int]:
-        """(rows, columns) of views of which stops let in some light of a point in focus."""
+        """(rows, columns) of views of which stops pass some light of a point in focus."""
         if self.stop is None:
             return self.views
         across, down = np.linalg.norm(self.frame.linear[:2, :2], axis=0)
         rows, columns = self.views
-        # Views that are directions all come in where any does.
+        # Views that are directions either all pass or none does.
         return (
             min(rows, enough(2 * self.stop / down)) if down > 0 else rows,
             min(columns, enough(2 * self.stop / across)) if across > 0 else columns,
@@ -142,7 +142,7 @@ class Folded:
 
     @property
     def half_width(self) -> float | None:
-        """Half the width at the entrance plane of the light of a point in focus, metres: of stops or views."""
+        """Half the width at the entrance plane of light of a point in focus, metres, limited by stops or views."""
         widths = [] if self.stop is None else [self.stop]
         if min(self.views) > 1:
             extent = np.abs(self.frame.linear[:2, :2]).sum(axis=0) * self.views[::-1]
@@ -151,7 +151,7 @@ class Folded:
 
 
 def ends_matrices(stage: Stage) -> bool:
-    """Whether a stage's deflection has another derivative than the matrices of rays say."""
+    """Whether a stage's deflection has a derivative that the ray matrices do not contain."""
     bending = stage.faces.bending
     if bending is None or isinstance(bending, FacetDeflection):
         return False
@@ -159,25 +159,25 @@ def ends_matrices(stage: Stage) -> bool:
 
 
 def at_vergence(rays: Affine, vergence: float) -> Array:
-    """2×2: places at a plane from places at the entrance, of the light of a point at 1/Z: A + B/Z."""
+    """2×2: positions at a plane from positions at the entrance, for light of a point at 1/Z: A + B/Z."""
     return np.asarray(rays.linear[:2, :2] + rays.linear[:2, 2:] * vergence)
 
 
 def stretch(matrix: Array) -> float:
-    """By how much a 2×2 makes lengths grow at most."""
+    """The largest factor by which a 2×2 matrix stretches lengths."""
     return float(np.linalg.norm(matrix, 2))
 
 
 def widest(steps: Array) -> float:
-    """The longest of the columns of a matrix."""
+    """The largest norm of the columns of a matrix."""
     return float(np.linalg.norm(steps, axis=0).max())
 
 
 def singular(matrix: Array) -> bool:
-    """Whether a 2×2 cannot be undone, but for its rounding."""
+    """Whether a 2×2 matrix is singular, to rounding."""
     return bool(abs(np.linalg.det(matrix)) <= ROUNDING * np.abs(matrix).max() ** 2)
 
 
 def enough(count: float) -> int:
-    """The whole number that is no less, but for rounding."""
+    """The next larger integer, with a tolerance for rounding."""
     return math.ceil(count - ROUNDING)

@@ -1,8 +1,8 @@
-"""How well a light field's samples, a camera's pixels and light's wavelength carry what a camera asks of them.
+"""Limits of a light field's samples, a camera's pixels and the wavelength for a camera and a light field.
 
-All of it is first-order geometry of the frame and of the camera's matrices: numbers in closed form, no rays and
-no samples. Where light is bent otherwise than by lenses, prisms and plane facets, matrices end; what would need
-them is left out there, and `SamplingLimits.notes` says so."""
+All numbers are first-order geometry of the frame and the camera's matrices: closed forms, without rays and
+samples. Where elements other than lenses, prisms and plane facets bend light, matrices are not exact; numbers
+that would need them are omitted, and `SamplingLimits.notes` lists them."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ Array = NDArray[np.float64]
 Items = dict[str, SamplingItem]
 
 GREEN_LIGHT = 550e-9
-"""The wavelength taken where none is given, metres: where eyes and sensors see best."""
+"""Default wavelength, metres: near the highest sensitivity of eyes and sensors."""
 LARGEST_SLOPE = 0.3
-"""Beyond this slope (17°) tangent and sine, which paraxial optics takes as one, differ by more than 4.4 %."""
+"""Beyond this slope (17°), tangent and sine differ by more than 4.4 %; paraxial optics assumes they are equal."""
 AIRY = 0.61
 """First zero of the Airy pattern: radius = 0.61 λ·distance / half the opening (Born and Wolf, section 8.5.2)."""
 
@@ -42,7 +42,7 @@ def sampling_limits(
     vergences: tuple[float, float] | None,
     wavelength: float = GREEN_LIGHT,
 ) -> SamplingLimits:
-    """The limits for a light field before a camera.
+    """The sampling limits for a camera and a light field.
 
     Args:
         train: any.
@@ -51,7 +51,7 @@ def sampling_limits(
         wavelength: metres.
 
     Raises:
-        InputError: a wavelength of 0 or less.
+        InputError: a wavelength that is not positive.
     """
     checks.above_zero("wavelength", wavelength, "a length", unit="m", way_out="such as 550 * nm")
     optics = Folded(train, grid, vergences)
@@ -93,7 +93,7 @@ def _notes(optics: Folded) -> tuple[str, ...]:
 
 
 def _reach(optics: Folded, stage: Stage) -> float | None:
-    """How far a stage spreads light on the sensor, metres."""
+    """How far a stage spreads light on the sensor, metres; None if unknown."""
     onwards, spread = optics.onwards(stage), stage.faces.spread
     if onwards is None or spread is None:
         return None
@@ -101,7 +101,7 @@ def _reach(optics: Folded, stage: Stage) -> float | None:
 
 
 def _before_what_blocks(optics: Folded, wavelength: float) -> Items:
-    """What is known of light field and sensor; or of a lens array, where that is the first to end matrices."""
+    """Items for light field and sensor; or for a lens array, if it is the first stage without exact matrices."""
     gaps, array = optics.gaps, optics.blocking
     if gaps is not None:
         of_views = _disparities(optics, gaps) | _view_counts(optics, gaps)
@@ -115,12 +115,12 @@ def _before_what_blocks(optics: Folded, wavelength: float) -> Items:
 
 
 def _focus_distance(gaps: ViewGaps) -> float | None:
-    """Of what is in focus before the entrance plane, metres."""
+    """Distance in focus before the entrance plane, metres."""
     return None if gaps.focus is None or gaps.focus < -ROUNDING else distance_of(gaps.focus)
 
 
 def _disparities(optics: Folded, gaps: ViewGaps) -> Items:
-    """Between neighbouring views' pictures of what is nearest, in focus and farthest."""
+    """Distances between neighbouring views' images of the nearest, the focused and the farthest point."""
     if max(gaps.views) < 2:
         return {}
     return {
@@ -136,7 +136,7 @@ def _disparities(optics: Folded, gaps: ViewGaps) -> Items:
 
 
 def _places(optics: Folded, gaps: ViewGaps) -> Iterator[tuple[str, float]]:
-    """The distances that are looked at, as 1/Z."""
+    """The names and 1/Z of the distances of interest."""
     if optics.vergences is not None:
         yield "near", optics.vergences[1]
     if gaps.focus is not None and gaps.focus > -ROUNDING:
@@ -146,7 +146,7 @@ def _places(optics: Folded, gaps: ViewGaps) -> Iterator[tuple[str, float]]:
 
 
 def _view_counts(optics: Folded, gaps: ViewGaps) -> Items:
-    """Views in the stop's width, against as many as make the scene's largest gap one that is not seen."""
+    """Views within the stop's width, and the number for which the scene's largest gap is not visible."""
     if optics.vergences is None:
         return {}
     rows, columns = gaps.views
@@ -166,13 +166,13 @@ def _samples(optics: Folded, gaps: ViewGaps) -> Items:
     width = widest((optics.to_sensor @ optics.frame).linear[:2, 2:])
     rows, columns = optics.pixels
     needed = enough(rows * gaps.footprint), enough(columns * gaps.footprint)
-    # In units of the pixel along the axis that decides, for pixels that are not square.
+    # Relative to the pixel along the limiting axis, for pixels that are not square.
     limit = width / gaps.footprint if gaps.footprint > 0 else optics.pixel
     return {"samples": words.sample_on_sensor(width, limit, needed)}
 
 
 def _lenslets(optics: Folded, array: Stage, pitch: float, wavelength: float) -> Items:
-    """A lenslet is the pixel of a plenoptic camera's picture; the pixels behind it tell views apart."""
+    """Items for a plenoptic camera: a lenslet acts as a pixel of its image; pixels behind it separate views."""
     label = array.element.label
     width = widest((array.arriving @ optics.frame).linear[:2, 2:])
     needed = math.ceil(max(optics.pixels) * width / pitch)
@@ -191,19 +191,19 @@ def _lenslets(optics: Folded, array: Stage, pitch: float, wavelength: float) -> 
 
 
 def _slopes_at_lenslet(arriving: Affine) -> Array:
-    """How the slope of rays through a lenslet's middle changes from place to place of the entrance plane.
+    """The change of slope of rays through a lenslet's centre per position on the entrance plane.
 
-    Where x = A·u + B·s is fixed, s' = C·u + D·s changes by (C − D·B⁻¹·A)·du.
+    For fixed x = A·u + B·s, s' = C·u + D·s changes by (C − D·B⁻¹·A)·du.
     """
     (a, b), (c, d) = (np.hsplit(rows, 2) for rows in np.vsplit(arriving.linear, 2))
     return np.asarray(c - d @ np.linalg.solve(b, a))
 
 
-# --- light itself ---
+# --- diffraction ---
 
 
 def _airy(optics: Folded, wavelength: float) -> Items:
-    """A change of slope λ/width at the entrance moves light by B times as much on the sensor, in focus or not."""
+    """Airy item: a slope change λ/width at the entrance moves light on the sensor by B times that."""
     half, lever = optics.half_width, stretch(optics.sensor_from_slope)
     if half is None or lever <= ROUNDING * half:
         return {}
@@ -211,7 +211,7 @@ def _airy(optics: Folded, wavelength: float) -> Items:
 
 
 def _slope(optics: Folded) -> Items:
-    """The largest slope of the rays that there are, at any plane that matrices lead to."""
+    """The largest slope of the available rays, at any plane reached by exact matrices."""
     planes = [Affine.identity()]
     planes += [rays for stage in optics.reached for rays in (stage.arriving, stage.leaving)]
     if optics.blocking is None:
@@ -224,7 +224,7 @@ def _slope(optics: Folded) -> Items:
 
 
 def _outermost(optics: Folded) -> Iterator[Array]:
-    """Rays (n, 4) at the entrance plane that bound what there is; each set bounds it by itself."""
+    """Two sets of rays (n, 4) at the entrance plane, each an upper bound of the available rays."""
     nv, nu, nt, ns = *optics.views, *optics.pixels
     corners = itertools.product(*((-0.5, count - 0.5) for count in (nu, nv, ns, nt)))
     yield optics.frame(np.array(list(corners)))
@@ -234,7 +234,7 @@ def _outermost(optics: Folded) -> Iterator[Array]:
 
 
 def _from_rim_to_corners(optics: Folded, half: float) -> Array:
-    """Rays (n, 4) from eight places around the light of a point in focus to the sensor's four corners."""
+    """Rays (n, 4) from eight points around the light of a point in focus to the sensor's four corners."""
     sensor, to_sensor = optics.train.sensor, optics.to_sensor
     height, width = sensor.size
     corners = np.array(list(itertools.product((-width / 2, width / 2), (-height / 2, height / 2))))

@@ -1,4 +1,4 @@
-"""What a mask's detail asks of a light field, of the sensor and of light: numbers in closed form."""
+"""Requirements of a mask's detail on the light field, the sensor and the wavelength, in closed form."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ Items = dict[str, SamplingItem]
 def finest_detail(pattern: Pattern) -> float | None:
     """The width of the finest bright or dark part of a pattern, metres.
 
-    Of cells their smaller side, of cosines half the finest period, of openings in a lattice their size. None for
-    stops and other plain openings, which have no detail.
+    For cells it is their smaller side, for cosines half the finest period, for openings in a lattice their
+    size. None for stops and other plain openings, which have no detail.
 
     Raises:
-        InputError: a function of position, of which this cannot be known.
+        InputError: a function of position, whose detail is unknown.
     """
     match pattern:
         case Bounded():
@@ -55,11 +55,11 @@ def finest_detail(pattern: Pattern) -> float | None:
 
 
 def mask_limits(optics: Folded, stage: Stage, wavelength: float) -> tuple[Items, tuple[str, ...]]:
-    """What the detail of a stage's pattern asks for, by key, and in words what is not given of it.
+    """Items for the detail of a stage's pattern, by key, and notes about numbers that are not available.
 
     Args:
-        optics: of which the stage is one.
-        stage: with a pattern or without.
+        optics: with the stage.
+        stage: with or without a pattern.
         wavelength: metres.
     """
     label = stage.element.label
@@ -86,7 +86,7 @@ class _Mask:
     """A mask with detail in a camera.
 
     Args:
-        optics: of the camera.
+        optics: with the camera.
         stage: the mask's.
         detail: metres.
     """
@@ -103,23 +103,23 @@ class _Mask:
 
     @property
     def place(self) -> Array:
-        """2×4: place at the mask per index step (i, j, k, l)."""
+        """2×4: position at the mask per index step (i, j, k, l)."""
         return (self.stage.arriving @ self.optics.frame).linear[:2]
 
     @property
     def in_aperture(self) -> bool:
-        """Whether all of a view meets one part of the mask."""
+        """Whether a whole view passes through one part of the mask."""
         rows, columns = self.optics.pixels
         return bool((np.abs(self.place[:, 2:]) @ [columns, rows]).max() <= self.detail)
 
     @property
     def lever(self) -> float | None:
-        """Metres on the sensor per change of slope at the mask; None where not affine."""
+        """Metres on the sensor per change of slope at the mask; None if not affine."""
         onwards = self.optics.onwards(self.stage)
         return None if onwards is None else stretch(onwards.linear[:2, 2:])
 
     def cells(self) -> Items:
-        """What a view's cell covers of the mask, in the light of what is looked at; and what a sample does."""
+        """The area of the mask covered by a view's cell, for points in focus, and by a sample."""
         motion = index_motions(self.optics.frame, np.array([self.optics.looked_at]))[0]
         of_view = self.place[:, :2] - self.place[:, 2:] @ motion
         return {
@@ -128,7 +128,7 @@ class _Mask:
         }
 
     def _cell(self, steps: Array, counts: tuple[int, int], of_view: bool) -> SamplingItem:
-        """The longer of the steps along two indices, of those that are counted at all; (rows, columns) of them."""
+        """An item for the longer step along two indices, of those with a count above 1; counts (rows, columns)."""
         across, down = np.linalg.norm(steps, axis=0)
         lengths = [length for length, count in ((across, counts[1]), (down, counts[0])) if count > 1]
         width = float(max(lengths, default=0.0))
@@ -136,7 +136,7 @@ class _Mask:
         return words.cell_at_mask(self.label, of_view, width, self.detail, (rows, columns))
 
     def shadow(self) -> Items:
-        """The mask's shadow by light of one place of the entrance plane: x = B·s there, B_mask·s at the mask."""
+        """The mask's shadow for one point of the entrance plane: x = B·s on the sensor, B_mask·s at the mask."""
         by_slope = self.stage.arriving.linear[:2, 2:]
         if self.lever is None or singular(by_slope):
             return {}
@@ -146,14 +146,14 @@ class _Mask:
         return {f"{self.label} shadow": words.shadow(self.label, width, pixel, self.detail)}
 
     def fresnel(self, wavelength: float) -> Items:
-        """What diffraction takes from the shadow's sharpness: √(λ·d), the width of the first Fresnel zone."""
+        """Diffraction blur of the shadow: √(λ·d), the width of the first Fresnel zone."""
         if self.lever is None:
             return {}
         blur, nearer = math.sqrt(wavelength * self.lever), self.detail**2 / wavelength
         return {f"{self.label} diffraction": words.fresnel_blur(self.label, blur, self.detail, nearer)}
 
     def holes(self, wavelength: float) -> Items:
-        """How far a hole a wide spreads light, λ·d/a, against its picture in the most blurred point."""
+        """Diffraction spread of a hole of width a, λ·d/a, compared with its image in the most blurred point."""
         if self.lever is None or self.optics.vergences is None:
             return {}
         blur = max(self.detail * self._growth(vergence) for vergence in self.optics.vergences)
@@ -161,7 +161,7 @@ class _Mask:
         return {f"{self.label} diffraction": words.hole_diffraction(self.label, spread, blur)}
 
     def _growth(self, vergence: float) -> float:
-        """Size on the sensor over size at the mask of the light of a point: (A + B/Z) over that at the mask."""
+        """Size on the sensor / size at the mask of the light of a point at 1/Z: the ratio of A + B/Z."""
         here, there = (
             stretch(at_vergence(rays, vergence)) for rays in (self.stage.arriving, self.optics.to_sensor)
         )

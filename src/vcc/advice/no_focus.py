@@ -1,4 +1,4 @@
-"""Why nothing before a camera is sharp on its sensor, in a sentence: lenses that diverge, or a sensor too near."""
+"""A sentence that explains why no object is sharp: diverging lenses, or a sensor too close."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from vcc.optics.focusing import bends
 from vcc.optics.train import Train
 
 AS_A_PINHOLE = 0.1
-"""Of the sensor's shorter side: a point whose light covers less of it shows as the image of a pinhole."""
+"""Light of a point that covers less than this share of the sensor's shorter side counts as a pinhole image."""
 
 
 def no_image(train: Train, grid: Grid) -> str:
-    """A sentence about lenses that bring no point before the camera to a focus; empty where any could be.
+    """A sentence about lenses that focus no point before the camera; empty if some point can be in focus.
 
-    Empty too where no lens bends light, where plates, arrays, diffusers or the detail of masks make the picture,
-    and where stops are so small that they image as pinholes do.
+    Also empty if no lens bends light, if plates, arrays, diffusers or the detail of masks form the image, and
+    if stops are so small that they image as pinholes.
 
     Args:
         train: any.
-        grid: of the light field, which bounds the light where no stop does.
+        grid: of the light field; it limits the light if no stop does.
     """
     bending = [element for element in train.elements if bends(element)]
     faces = [stage.faces for stage in train.stages]
@@ -38,7 +38,7 @@ def no_image(train: Train, grid: Grid) -> str:
         return ""
     behind = max(element.z + element.length for element in train.elements if element.length or element in bending)
     rays = train.rays_at(behind).linear
-    if _focuses(rays) or any(map(_has_detail, faces)):  # detail is looked for cell by cell: last
+    if _focuses(rays) or any(map(_has_detail, faces)):  # last: checks each cell
         return ""
     optics, power = Folded(train, grid, None), -float(rays[2, 0])
     covered = (
@@ -61,10 +61,10 @@ def no_image(train: Train, grid: Grid) -> str:
 
 
 def why_unfocused(optics: Folded) -> str:
-    """A sentence that says why nothing is in focus; empty where something is, or where no lens bends light.
+    """A sentence that explains why nothing is in focus; empty if something is, or if no lens bends light.
 
     Args:
-        optics: of the camera and its light field.
+        optics: with the camera and its light field.
     """
     gaps = optics.gaps
     if gaps is None or gaps.focus is None or gaps.focus >= -ROUNDING:
@@ -83,7 +83,7 @@ def why_unfocused(optics: Folded) -> str:
 
 
 def _has_detail(faces: Faces) -> bool:
-    """Whether what stands there absorbs otherwise than plain openings do."""
+    """Whether a pattern absorbs in other ways than a plain opening."""
     try:
         return faces.pattern is not None and finest_detail(faces.pattern) is not None
     except InputError:
@@ -91,11 +91,11 @@ def _has_detail(faces: Faces) -> bool:
 
 
 def _focuses(rays: NDArray[np.float64]) -> bool:
-    """Whether some point before the camera has a real image along x or y, behind the place that rays lead to.
+    """Whether some point before the camera has a real image along x or y, behind the plane of the ray map.
 
-    Light of a point at 1/Z = V arrives at A + B·V with the slope C + D·V, for a place of 1 at the entrance: it
-    meets −(A + B·V)/(C + D·V) behind that, which changes its sign at two values of V only. Optics that are rotated
-    about the axis are taken to focus: their axes do not separate.
+    Light of a point at 1/Z = V through position 1 of the entrance arrives at A + B·V with slope C + D·V. It
+    meets the axis at −(A + B·V)/(C + D·V) behind the plane, which changes sign only at two values of V.
+    Optics rotated about the axis are assumed to focus, since their axes do not separate.
     """
     blocks = [rays[rows, columns] for rows in (slice(0, 2), slice(2, 4)) for columns in (slice(0, 2), slice(2, 4))]
     if any(np.abs(block - np.diag(np.diag(block))).max() > ROUNDING * np.abs(rays).max() for block in blocks):

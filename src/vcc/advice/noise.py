@@ -1,4 +1,4 @@
-"""Whether an image by rays has more sampling error than it should, and how many rays would do, in a sentence."""
+"""A sentence for images by rays with too much sampling error, with the number of rays that suffices."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from vcc.plan.rays.model import Rays
 from vcc.run.drive import Recorded
 
 ENOUGH = 40.0
-"""dB of the brightest pixel over the root mean square of the sampling error, from which on nothing is said."""
+"""Ratio in dB of the brightest pixel to the root mean square sampling error, from which on nothing is reported."""
 
 
 def rays_for(samples: int, decibels: float) -> int:
-    """Rays a pixel by which `ENOUGH` is reached, a power of two; the error falls as 1/√rays, or faster.
+    """Rays per pixel that reach `ENOUGH`, a power of two; the error falls as 1/√rays, or faster.
 
     Args:
-        samples: rays a pixel that were taken.
-        decibels: that they reach.
+        samples: rays per pixel so far.
+        decibels: ratio reached with them.
     """
     return int(2 ** math.ceil(math.log2(samples) + (ENOUGH - decibels) / (20 * math.log10(2)) * 2))
 
 
 def remedy(samples: int, decibels: float) -> str:
-    """How to reach `ENOUGH`, or to come near; the arguments are those of `rays_for`."""
+    """How to reach `ENOUGH`, or to come close; for the arguments see `rays_for`."""
     needed = rays_for(samples, decibels)
     if needed <= LARGEST_SAMPLES:
         return f"pass samples={needed} for {ENOUGH:.0f} dB"
@@ -39,11 +39,11 @@ def remedy(samples: int, decibels: float) -> str:
 
 
 def why_noisy(plan: Plan, how: How, found: Recorded) -> str | None:
-    """A sentence that gives the sampling error and the remedy; None where it is small, or the rays were chosen.
+    """A sentence with the sampling error and a remedy; None if the error is small, or the user chose the rays.
 
     Args:
-        plan: that made the image.
-        how: what was chosen.
+        plan: of the image.
+        how: the settings.
         found: the image, and what the run reports.
     """
     core = plan.core

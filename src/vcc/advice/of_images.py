@@ -1,4 +1,4 @@
-"""What is said of an image, and of a camera before its image is made: sentences, for warnings."""
+"""Warnings about an image, and about a camera before its image is made, as sentences."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from vcc.run.drive import Recorded
 
 
 class Cautions:
-    """What is said of a camera's images of a light field.
+    """Warnings about a camera's images of a light field.
 
     Args:
-        train: the camera. Those that differ in the cells of a mask alone may share what is said.
+        train: the camera. Cameras that differ only in the cells of a mask may share the warnings.
         grid: of the light field.
     """
 
@@ -38,7 +38,7 @@ class Cautions:
     @property
     @cached
     def _lengths(self) -> str:
-        """Lengths that no camera has."""
+        """Lengths that are implausible for a camera, as text."""
         return metres_meant(self.train, self.grid)
 
     @property
@@ -53,24 +53,24 @@ class Cautions:
         return no_image(self.train, self.grid)
 
     def before(self) -> Iterator[str]:
-        """What is said before an image is made, which may take minutes."""
+        """Warnings before an image is made, which may take minutes."""
         if self._hopeless and self._lengths:
             yield f"hardly any light will reach the sensor. {self._lengths}"
 
     def of(self, plan: Plan, samples: Samples, found: Recorded, how: How | None = None) -> Iterator[str]:
-        """What is said of an image that is dark, lacks rays, is noisy or cannot be sharp, with sizes.
+        """Warnings about an image that is dark, lacks rays, is noisy or cannot be sharp, with numbers.
 
         Args:
-            plan: by which it was made.
-            samples: of which.
-            found: the image, and what the run reports.
-            how: what was chosen; None where nothing is to be said of noise.
+            plan: of the image.
+            samples: of the image.
+            found: the image, and the statistics of its run.
+            how: the settings; None skips warnings about noise.
         """
         if how is not None and (noisy := why_noisy(plan, how, found)):
             yield noisy
         black = why_dark(plan, samples, found)
         why = black or why_darker(found) or ""
-        # Lengths may be the reason: where enough is missing, and they were not said before.
+        # Implausible lengths may be the reason: report them if much is missing, and if not reported before.
         few_missing = bool(why) and not black and found.missing_rays <= MANY_MISSING
         lengths = "" if self._hopeless or few_missing else self._lengths
         if lengths and not why and is_faint(found, samples):
@@ -81,26 +81,26 @@ class Cautions:
             yield self._unfocused
 
 
-# --- lengths that no camera has: a thousand times too long ---
+# --- implausible lengths: a thousand times too long ---
 
 
 LONG = 1.0
-"""Metres from which on a length of a camera, but for pitches, may be one of millimetres (or of a telescope)."""
+"""Metres above which a length of a camera, except pitches, may be meant in millimetres (or be a telescope's)."""
 WIDE_PITCH = 0.02
-"""Likewise a pitch of pixels or lenslets, metres."""
+"""The same limit for pitches of pixels or lenslets, metres."""
 WIDE_PIXEL = 1e-3, 0.01
-"""Likewise a pitch of pixels, metres, that is also such a share of the sensor's distance."""
+"""The same limit for pitches of pixels: metres, and a share of the sensor's distance; both must be exceeded."""
 FAINT = 1e-5
-"""Share of the scene's radiance below which a picture is nearly black: what passes at f/280, π/4/N²."""
+"""Share of the scene's radiance below which an image is nearly black: as for f/280, π/4/N²."""
 MANY_MISSING = 0.25
-"""Share of the rays asked for of which so many are missing that lengths are looked at."""
+"""Share of missing rays above which lengths are checked."""
 _NAMED = 3
 
 
 def metres_meant(train: Train, grid: Grid) -> str:
-    """The lengths of a camera and a light field that are absurd as metres, and what was meant; empty for none.
+    """The implausible lengths of a camera and a light field, with a suggestion, as text; empty if there are none.
 
-    Large cameras have such lengths by right: this is to be said only where rays are missing or a picture is dark.
+    Large cameras may really have such lengths: report them only if rays are missing or the image is dark.
     """
     wide_pixel = min(max(WIDE_PIXEL[0], WIDE_PIXEL[1] * train.sensor.z), WIDE_PITCH)
     absurd = [(what, value) for what, value in _lengths(train, grid) if _is_absurd(what, value, wide_pixel)]
@@ -109,7 +109,7 @@ def metres_meant(train: Train, grid: Grid) -> str:
     named = ", ".join(f"{what} is {short(value)}" for what, value in absurd[:_NAMED])
     more = ", …" if len(absurd) > _NAMED else ""
     what, value = absurd[0]
-    # 48 in Python may stand for 48 um, 0.096 for 0.096 mm, and "96 mm" in a file for the same 96 um.
+    # 48 in Python may be meant as 48 um, 0.096 as 0.096 mm, and "96 mm" in a file as 96 um.
     meant = short(value * (1e-6 if "pitch" in what and abs(value) >= LONG else 1e-3))
     python = f"{as_python(meant)} in Python, where a number without a unit is metres"
     return f"{named}{more}; did you mean {meant} ({python})?"
@@ -121,7 +121,7 @@ def _is_absurd(what: str, value: float, wide_pixel: float) -> bool:
 
 
 def _lengths(train: Train, grid: Grid) -> Iterator[tuple[str, float]]:
-    """All lengths, by what they are of."""
+    """All lengths, with their descriptions."""
     for element in train.elements:
         yield from _of(element, element.label)
     yield from _of(train.sensor, "the sensor")
@@ -140,10 +140,10 @@ def _of(thing: Any, label: str) -> Iterator[tuple[str, float]]:
 
 
 def light_share(train: Train, grid: Grid) -> float:
-    """Irradiance over radiance that all views together give the middle of the sensor: their area / (Bx·By).
+    """Irradiance divided by radiance at the centre of the sensor, from all views together: their area / (Bx·By).
 
-    With x' = A·u + B·s on the sensor and A·D − B·C = 1, views du apart meet a place there at slopes du/B apart.
-    What bends rays not as a lens does is passed over, and so is what stops them.
+    With x' = A·u + B·s on the sensor and A·D − B·C = 1, views du apart reach a point there at slopes du/B apart.
+    Stops, and elements that do not bend rays as a lens does, are ignored.
     """
     views = abs(np.linalg.det(grid.frame.linear[:2, :2])) * grid.shape[0] * grid.shape[1]
     across = abs(np.linalg.det(train.arriving_at_sensor.linear[:2, 2:]))
@@ -151,7 +151,7 @@ def light_share(train: Train, grid: Grid) -> float:
 
 
 def is_faint(found: Recorded, samples: Samples) -> bool:
-    """Whether a picture holds less than `FAINT` of the radiance of the middle view; NumPy pictures only."""
+    """Whether the image's mean is below `FAINT` times the radiance of the middle view; NumPy images only."""
     if not isinstance(found.values, np.ndarray):
         return False
     grid = samples.grid
@@ -165,19 +165,19 @@ def is_faint(found: Recorded, samples: Samples) -> bool:
 
 
 MUCH_MISSING = 0.01
-"""Share of the rays asked for that may be missing without a word."""
+"""Share of missing rays above which a warning is given."""
 
 
 def why_dark(plan: Plan, samples: Samples, found: Recorded) -> str | None:
-    """A sentence that says why a picture is exactly 0 everywhere; None where it is not, or where it must be.
+    """A sentence that explains why an image is exactly 0 everywhere; None if it is not, or if it must be 0.
 
-    It must be 0 where the light field is dark, and where a mask lets nothing through, which footprints know and
-    rays do not. Only NumPy pictures are looked at, and the light field only where the picture is 0.
+    It must be 0 if the light field is dark, or if a mask is opaque, which is known for footprints only. Only NumPy
+    images are checked, and the light field only if the image is 0.
 
     Args:
-        plan: that made the picture.
-        samples: of which it was made.
-        found: the picture, and what the run told.
+        plan: of the image.
+        samples: of the image.
+        found: the image, and the statistics of its run.
     """
     if not isinstance(found.values, np.ndarray) or _lit(found.values):
         return None
@@ -197,10 +197,10 @@ def why_dark(plan: Plan, samples: Samples, found: Recorded) -> str | None:
 
 
 def why_darker(found: Recorded) -> str | None:
-    """A sentence that says how many rays are missing, and why; None where they are few.
+    """A sentence that reports how many rays are missing, and why; None if they are few.
 
     Args:
-        found: what the run told.
+        found: the statistics of the run.
     """
     if found.missing_rays > MUCH_MISSING:
         return (
@@ -211,7 +211,7 @@ def why_darker(found: Recorded) -> str | None:
 
 
 def _lit(picture: np.ndarray[Any, Any]) -> bool:
-    """Whether any pixel is not 0: most often that in the middle."""
+    """Whether any pixel is not 0; checks the central one first."""
     rows, columns = picture.shape[:2]
     return bool(picture[rows // 2, columns // 2].any() or picture.any())
 
@@ -234,14 +234,14 @@ def _why_no_rays(core: Rays, rays: int) -> str:
 
 
 def _why_no_footprints(plan: Plan, core: Any) -> str | None:
-    """None where masks close the camera: nothing was asked for."""
+    """None if masks close the camera, so that no light is expected."""
     assert isinstance(core, Footprints)
     on = next((operator for operator in plan.after if isinstance(operator, OnSensor)), OnSensor(0))
     open_sensor = on.transmission is None or on.transmission.any()
     if not all(mask.texture.any() for mask in core.masks) or not open_sensor:
         return None
     if not core.weights.any():
-        # A stop that is open beside the grid of views asks for rays that are missing; a closed one for none.
+        # A stop that is open outside the grid of views requires missing rays; a closed one requires none.
         return "what passes the stops comes from beside the grid of views" if plan.missing_rays else None
     corners = np.array([[k, l] for k in (0, core.samples[1] - 1) for l in (0, core.samples[0] - 1)])
     used = core.weights > 0

@@ -1,7 +1,7 @@
-"""How far apart on the sensor neighbouring views' pictures of a point are, by the point's distance.
+"""Distances on the sensor between neighbouring views' images of a point, as a function of the point's distance.
 
-With x = A·u + B·s on the sensor, a point at distance Z before the entrance plane (s = u/Z) reaches it at
-(A + B/Z)·u: neighbouring views' pictures of it lie (A + B/Z)·du apart, and it is in focus where that is 0.
+With x = A·u + B·s on the sensor, a point at distance Z before the entrance plane (s = u/Z) is imaged at
+(A + B/Z)·u: neighbouring views' images of it are (A + B/Z)·du apart, and it is in focus if that is 0.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from vcc.plan.parallax_rule import index_motions
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9
-"""Of a limit: what differs from it by less is at it."""
+"""Relative tolerance: values this close to a limit count as equal to it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewGaps(Brief):
-    """How far apart on the sensor neighbouring views' pictures of a point are, by the point's distance.
+    """Distances on the sensor between neighbouring views' images of a point, as a function of its distance.
 
     Args:
         frame: of the light field.
         on_sensor: 2×4, pixels (across, down) per metre and per slope of rays at the entrance plane.
-        views: (rows, columns).
+        views: (rows, columns) of views.
     """
 
     frame: Affine
@@ -37,7 +37,7 @@ class ViewGaps(Brief):
     views: tuple[int, int]
 
     def along_axes(self, vergences: Array) -> Array:
-        """Pixels from each view to the next along (u, v), (n, 2), for points at 1/Z = ``vergences``, (n,), 1/m."""
+        """Pixels between neighbouring views along (u, v), (n, 2), for points at 1/Z = ``vergences``, (n,), 1/m."""
         per_index = self.on_sensor @ self.frame.linear
         steps = per_index[:, :2] - per_index[:, 2:] @ index_motions(self.frame, vergences)
         gaps = np.linalg.norm(steps, axis=1)
@@ -45,31 +45,31 @@ class ViewGaps(Brief):
         return np.where(gaps < ROUNDING, 0.0, gaps)
 
     def at(self, vergences: Array) -> Array:
-        """The larger of both, pixels, (n,)."""
+        """The larger of the distances along u and v, pixels, (n,)."""
         return np.asarray(self.along_axes(np.asarray(vergences, dtype=np.float64)).max(axis=1))
 
     @property
     def footprint(self) -> float:
-        """How wide a sample of a view is on the sensor, pixels."""
+        """Width of a view's sample on the sensor, pixels."""
         return float(np.linalg.norm((self.on_sensor @ self.frame.linear)[:, 2:], axis=0).max())
 
     @property
     def limit(self) -> float:
-        """The gap up to which no ghosts are seen: a pixel, or a sample where that is wider."""
+        """The largest gap without visible ghosts: a pixel, or a sample if that is wider."""
         return max(1.0, self.footprint)
 
     @property
     def focus(self) -> float | None:
-        """1/Z of what is in focus, 1/m; None where the sensor sees all depths alike."""
+        """1/Z of the plane in focus, 1/m; None if the sensor sees all depths alike."""
         by_place, by_slope = self.on_sensor[:, :2], self.on_sensor[:, 2:]
         square = float((by_slope**2).sum())
-        # Against its rounding: a sensor at an image of the entrance plane has no slopes to tell depths by.
+        # Relative to rounding: a sensor at an image of the entrance plane does not separate depths.
         if square <= (ROUNDING * np.abs(by_place).max()) ** 2:
             return None
         return -float((by_place * by_slope).sum()) / square
 
     def free_of_ghosts(self) -> tuple[float, float] | None:
-        """(lowest, highest) 1/Z between which gaps keep to the limit, 1/m; None where they do nowhere."""
+        """(lowest, highest) 1/Z with gaps within the limit, 1/m; None if there are none."""
         focus = self.focus
         if focus is None or max(self.views) < 2:
             return (-math.inf, math.inf) if self.at(np.zeros(1))[0] <= self.limit * (1 + ROUNDING) else None
@@ -78,7 +78,7 @@ class ViewGaps(Brief):
         return self._border(focus, -1.0), self._border(focus, 1.0)
 
     def _border(self, focus: float, sense: float) -> float:
-        """How far from focus gaps stay within the limit: gaps grow with the distance from focus in 1/Z."""
+        """The limit of 1/Z on one side of focus: gaps grow with the distance from focus in 1/Z."""
         inside, step = focus, sense * max(abs(focus), 1.0) * 1e-6
         while self._fine(inside + step):
             inside, step = inside + step, 2 * step
@@ -87,7 +87,7 @@ class ViewGaps(Brief):
         return self._bisected(inside, inside + step)
 
     def _bisected(self, inside: float, outside: float) -> float:
-        """The last 1/Z at which gaps keep to the limit, between one at which they do and one at which not."""
+        """The last 1/Z with gaps within the limit, by bisection between one inside and one outside."""
         while abs(outside - inside) > 1e-12 * max(abs(inside), abs(outside)):
             middle = (inside + outside) / 2
             if middle in (inside, outside):
@@ -100,5 +100,5 @@ class ViewGaps(Brief):
 
 
 def distance_of(vergence: float) -> float:
-    """The distance in metres of what lies at 1/Z = ``vergence``: infinite at 0, below 0 if light converges."""
+    """The distance in metres for 1/Z = ``vergence``: infinite at 0, negative if light converges."""
     return 1 / vergence if abs(vergence) > ROUNDING else math.inf

@@ -1,4 +1,4 @@
-"""What limits a camera's picture, in words made of its numbers (`vcc.advice.limits`, `vcc.advice.mask_limits`)."""
+"""Sampling limits as text, from the numbers of `vcc.advice.limits` and `vcc.advice.mask_limits`."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class SamplingItem:
-    """One thing that sampling, paraxial optics or diffraction limits.
+    """One quantity that sampling, paraxial optics or diffraction limits.
 
     Args:
-        name: what it is, in words.
+        name: description as text.
         value: in SI units, or in ``unit``.
         unit: ``"m"`` (metres), ``"pixels"``, ``"views"`` or ``"slope"``.
-        limit: what the value may be at most, or must be at least; in the same unit.
+        limit: largest or smallest allowed value, in the same unit.
         advice: what to do, or why nothing is to be done, one sentence.
-        at_least: whether the limit is the least value rather than the most.
+        at_least: whether the limit is the smallest value rather than the largest.
     """
 
     name: str
@@ -35,7 +35,7 @@ class SamplingItem:
 
     @property
     def fine(self) -> bool:
-        """Whether the value keeps to the limit."""
+        """Whether the value is within the limit."""
         if self.at_least:
             return self.value >= self.limit * (1 - ROUNDING)
         return self.value <= self.limit * (1 + ROUNDING)
@@ -47,7 +47,7 @@ class SamplingItem:
 
     @property
     def finding(self) -> str:
-        """Name, value and limit in words."""
+        """Name, value and limit as text."""
         bound = "at least" if self.at_least else "at most"
         return f"{self.name}: {_quantity(self.value, self.unit)} ({bound} {_quantity(self.limit, self.unit)})"
 
@@ -59,14 +59,14 @@ class SamplingItem:
 
 
 def distance_in_words(distance: float) -> str:
-    """A distance with its unit, or infinity; a negative one is that of light that converges, as from no scene."""
+    """A distance with its unit, or infinity; a negative one means converging light, which no scene emits."""
     if distance < 0:
         return f"beyond infinity (light converging {_short(-distance)} behind z = 0)"
     return "infinity" if math.isinf(distance) else _short(distance)
 
 
 def tangent_over_sine(slope: float) -> float:
-    """By how much the tangent of a ray's angle, its slope, exceeds the sine, as a share: √(1 + slope²) − 1."""
+    """The relative excess of the tangent of a ray's angle, its slope, over the sine: √(1 + slope²) − 1."""
     return math.hypot(1.0, slope) - 1
 
 
@@ -85,19 +85,19 @@ def _sizes(counts: tuple[int, int]) -> str:
     return "×".join(map(str, counts))
 
 
-# --- one limit each, of its numbers ---
+# --- one function per limit ---
 
 
 def _item(
     name: str, value: float, limit: float, fine: str, otherwise: str, unit: str = "m", at_least: bool = False
 ) -> SamplingItem:
-    """An item whose advice is one of two, as the value keeps to its limit or not."""
+    """An item with one of two texts of advice, depending on whether the value is within its limit."""
     item = SamplingItem(name, value, unit, limit, fine, at_least)
     return item if item.fine else replace(item, advice=otherwise)
 
 
 def disparity(where: str, gap: float, limit: float, views: int, free: Range | None) -> SamplingItem:
-    """From one view's picture of a point to the next one's, pixels, with so many views a side."""
+    """Distance in pixels between images of a point by neighbouring views, with ``views`` views per side."""
     within = "no depth at all" if free is None else " to ".join(map(distance_in_words, free))
     return _item(
         f"disparity per view on the sensor ({where})",
@@ -111,7 +111,7 @@ def disparity(where: str, gap: float, limit: float, views: int, free: Range | No
 
 
 def view_count(along: str, had: int, needed: int) -> SamplingItem:
-    """How many views there are across or down, within the stop, and how many the scene's depths need."""
+    """The number of views across or down within the stop, and the number that the scene's depths need."""
     return _item(
         f"views {along}",
         had,
@@ -124,7 +124,7 @@ def view_count(along: str, had: int, needed: int) -> SamplingItem:
 
 
 def sample_on_sensor(width: float, pixel: float, needed: tuple[int, int]) -> SamplingItem:
-    """The footprint of a light field's sample; (rows, columns) a view would fill the sensor's."""
+    """The footprint of a light field's sample; (rows, columns) of a view that would match the sensor."""
     finer = pixel / width if width > ROUNDING * pixel else math.inf
     return _item(
         "a sample of a view on the sensor",
@@ -141,7 +141,7 @@ def sample_on_sensor(width: float, pixel: float, needed: tuple[int, int]) -> Sam
 
 
 def sample_at_lenslets(label: str, width: float, pitch: float, needed: int) -> SamplingItem:
-    """The footprint of a light field's sample at a lens array, and the pixels a view that would be as fine."""
+    """The footprint of a light field's sample at a lens array, and the pixels per view that would be as fine."""
     return _item(
         f"a sample of a view at {label}",
         width,
@@ -152,7 +152,7 @@ def sample_at_lenslets(label: str, width: float, pitch: float, needed: int) -> S
 
 
 def views_behind_lenslet(label: str, apart: float, pixel: float, needed: int) -> SamplingItem:
-    """From one view's picture behind a lenslet to the next one's, and the views a side that pixels would see."""
+    """Distance between neighbouring views' images behind a lenslet, and the views per side that pixels resolve."""
     return _item(
         f"neighbouring views behind a lenslet of {label}",
         apart,
@@ -163,7 +163,7 @@ def views_behind_lenslet(label: str, apart: float, pixel: float, needed: int) ->
 
 
 def airy(where: str, radius: float, pixel: float) -> SamplingItem:
-    """How far light itself blurs."""
+    """Blur by diffraction."""
     return _item(
         f"Airy radius {where}",
         radius,
@@ -175,7 +175,7 @@ def airy(where: str, radius: float, pixel: float) -> SamplingItem:
 
 
 def largest_slope(slope: float, limit: float, until: str | None) -> SamplingItem:
-    """Of the ray that bends most, as far as the element that is named."""
+    """The largest slope of a ray, up to the named element."""
     advice = (
         f"Paraxial optics takes tangent and sine as one; here they differ by up to {tangent_over_sine(slope):.2%}"
         f", and a real camera's corners get {1 - (1 + slope**2) ** -2:.0%} less light (cos⁴)."
@@ -185,7 +185,7 @@ def largest_slope(slope: float, limit: float, until: str | None) -> SamplingItem
 
 
 def cell_at_mask(label: str, of_view: bool, width: float, detail: float, needed: tuple[int, int]) -> SamplingItem:
-    """How much of a mask a view's cell, or a sample, covers; how many (rows, columns) would be as fine as it."""
+    """Width of a view's cell or a sample at a mask; (rows, columns) that would match the mask's detail."""
     return _item(
         f"{'the cell of a view' if of_view else 'a sample'} at {label}",
         width,
@@ -197,7 +197,7 @@ def cell_at_mask(label: str, of_view: bool, width: float, detail: float, needed:
 
 
 def shadow(label: str, width: float, pixel: float, detail: float) -> SamplingItem:
-    """How wide a mask's detail is in its shadow on the sensor."""
+    """Width of a mask's detail in its shadow on the sensor."""
     return _item(
         f"shadow of the detail of {label} on the sensor",
         width,
@@ -212,7 +212,7 @@ def shadow(label: str, width: float, pixel: float, detail: float) -> SamplingIte
 
 
 def fresnel_blur(label: str, blur: float, detail: float, nearer: float) -> SamplingItem:
-    """How far diffraction blurs a mask's shadow, and how near to the sensor it would not."""
+    """Diffraction blur of a mask's shadow, and the distance to the sensor that avoids it."""
     return _item(
         f"Fresnel blur √(λ·d) of the shadow of {label}",
         blur,
@@ -224,7 +224,7 @@ def fresnel_blur(label: str, blur: float, detail: float, nearer: float) -> Sampl
 
 
 def hole_diffraction(label: str, spread: float, picture: float) -> SamplingItem:
-    """How far a hole of a mask in the aperture spreads light, and how large its picture is where most blurred."""
+    """Diffraction by a hole of a mask in the aperture, and the hole's size in the most blurred image."""
     return _item(
         f"diffraction λ·d/a by the holes of {label}",
         spread,
@@ -235,11 +235,11 @@ def hole_diffraction(label: str, spread: float, picture: float) -> SamplingItem:
     )
 
 
-# --- what is not given ---
+# --- numbers that are not available ---
 
 
 def blocked(label: str) -> str:
-    """Behind what matrices end."""
+    """Note about an element behind which matrices are not exact."""
     return (
         f"disparity, ghosts and footprints on the sensor are not given behind {label}, which bends rays otherwise "
         "than a lens or a prism"
@@ -247,7 +247,7 @@ def blocked(label: str) -> str:
 
 
 def spreads(label: str, reach: float | None) -> str:
-    """How far a diffuser spreads light on the sensor, metres; None where that is not known."""
+    """Note about a diffuser's spread on the sensor, metres; None if unknown."""
     if reach is None:
         return f"how far {label} spreads light on the sensor is not given"
     return (
@@ -257,43 +257,43 @@ def spreads(label: str, reach: float | None) -> str:
 
 
 def within_facets(label: str) -> str:
-    """Of what bends by plane facets."""
+    """Note about plane facets."""
     return f"{label} bends by plane facets: items hold within each, not across their edges"
 
 
 def detail_unknown(label: str, why: Exception) -> str:
-    """Of a mask that does not tell how fine it is."""
+    """Note about a mask of unknown detail."""
     return f"detail of {label} is not given: {why}"
 
 
 def footprints_unknown(label: str) -> str:
-    """Of a mask behind what matrices end at."""
+    """Note about a mask behind an element without exact matrices."""
     return f"the footprints of samples at {label} are not given"
 
 
-# --- all of it ---
+# --- all limits ---
 
 
 @dataclass(frozen=True, eq=False)
 class SamplingLimits:
-    """What a camera asks of a light field, what it gets, and where paraxial ray optics ends.
+    """The sampling limits of a camera and a light field, and the limits of paraxial optics.
 
     Args:
         items: by key: ``"disparity near"``, ``"disparity focus"``, ``"disparity far"`` (pixels per view on the
-            sensor), ``"views across"``, ``"views down"`` (had, within the stop; the limit is what is needed),
-            ``"samples"`` (footprint of a light field's sample), ``"slope"``, ``"airy"``, for a lens array
-            ``"view behind lenslet"`` and ``"lenslet airy"``, and for each mask with detail ``"LABEL views"``,
-            ``"LABEL samples"``, ``"LABEL shadow"`` and ``"LABEL diffraction"``, where LABEL is how messages call
-            the element, such as ``mask "code"``. What is not given is not there.
+            sensor), ``"views across"``, ``"views down"`` (available within the stop; the limit is the number
+            needed), ``"samples"`` (footprint of a light field's sample), ``"slope"``, ``"airy"``, for a lens
+            array ``"view behind lenslet"`` and ``"lenslet airy"``, and for each mask with detail ``"LABEL
+            views"``, ``"LABEL samples"``, ``"LABEL shadow"`` and ``"LABEL diffraction"``. LABEL is the
+            element's name in messages, such as ``mask "code"``. Items that are not available are missing.
         wavelength: metres.
-        focus_distance: of what is in focus before the entrance plane, metres: infinite or above 0; None where
-            nothing before the camera is.
-        depths: (near, far) of the scene, metres; None where unknown. A negative one is light that converges so far
-            behind the entrance plane, as behind a lens.
-        free_of_ghosts: (near, far) between which no ghost copies are seen, metres; None where there is no such
-            depth, or it is not given.
-        notes: what is not given and why, why nothing is in focus, and what diffusers hide.
-        gaps: between views, as a function of distance; None where they are not given.
+        focus_distance: distance in focus before the entrance plane, metres: positive or infinite; None if nothing
+            before the camera is in focus.
+        depths: (near, far) of the scene, metres; None if unknown. A negative value means light that converges
+            at this distance behind the entrance plane, as behind a lens.
+        free_of_ghosts: (near, far) of the range without ghost copies, metres; None if there is none, or if it
+            is not available.
+        notes: which numbers are not available and why, why nothing is in focus, and what diffusers hide.
+        gaps: between views, as a function of distance; None if not available.
         pixel: the smaller pitch of the sensor, metres.
         views: (rows, columns) of views.
     """
@@ -312,7 +312,7 @@ class SamplingLimits:
         """An item by its key.
 
         Raises:
-            InputError: there is none; the message lists those that there are.
+            InputError: an unknown key; the message lists the known ones.
         """
         if key not in self.items:
             why = f" Notes: {'; '.join(self.notes)}." if self.notes else ""
@@ -321,11 +321,11 @@ class SamplingLimits:
 
     @property
     def to_watch(self) -> tuple[SamplingItem, ...]:
-        """The items that do not keep to their limits."""
+        """The items that exceed their limits."""
         return tuple(item for item in self.items.values() if not item.fine)
 
     def range_in_words(self) -> str:
-        """Depths, focus and the range free of ghosts, one line."""
+        """Depths, focus and the range free of ghosts, in one line."""
         parts = [self._scene()] if self.gaps is None else [self._scene(), self._focus(self.gaps), self._free()]
         return "; ".join(part for part in parts if part)
 
@@ -349,7 +349,7 @@ class SamplingLimits:
 
 
 def in_words(limits: SamplingLimits) -> str:
-    """The main numbers and what to watch out for, a line each, indented: a section of `vcc.Camera.explain`."""
+    """The main numbers and the warnings, one per line, indented: a section of `vcc.Camera.explain`."""
     lines = [limits.range_in_words(), *_main_numbers(limits), *limits.notes]
     lines += [f"watch out: {item.finding}. {item.advice}" for item in _without_repeats(limits) if not item.fine]
     return "\n".join(f"  {line}" for line in lines if line)
@@ -373,7 +373,7 @@ def _main_numbers(limits: SamplingLimits) -> list[str]:
 
 
 def _without_repeats(limits: SamplingLimits) -> list[SamplingItem]:
-    """The number of views says for all depths what disparities say for each, and often for both axes."""
+    """The items without repetitions: the view count covers the disparities, and often both axes are equal."""
     told = {item.advice: item for key, item in reversed(limits.items.items()) if not key.startswith("disparity")}
     if limits.depths is None:
         told |= {item.advice: item for key, item in limits.items.items() if key.startswith("disparity")}

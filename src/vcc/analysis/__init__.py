@@ -1,7 +1,6 @@
-"""Tools that explain a design: 4-D Fourier transforms, refocusing by slices of them, point spread functions,
-sampling advice.
+"""Analysis of designs: 4-D Fourier transforms, Fourier slice refocusing, point spread functions, sampling advice.
 
-Built on cameras and light fields; nothing below depends on it.
+Built on cameras and light fields; no other package depends on it.
 """
 
 from vcc.analysis.aperture_search import OptimisedAperture, optimised_aperture

@@ -1,4 +1,4 @@
-"""A search for aperture patterns whose blur can be undone: Zhou and Nayar's genetic algorithm."""
+"""Search for aperture patterns whose blur can be inverted: the genetic algorithm of Zhou and Nayar."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from vcc.base.showing import Shown
 Array = NDArray[np.float64]
 
 _BATCH = 2**22
-"""Numbers in the kernels that are transformed together: 16 MiB in single precision."""
+"""Size of the kernels that are transformed together, in numbers: 16 MiB in single precision."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OptimisedAperture(Brief, Shown):
-    """The best pattern that a search met, and how it went.
+    """The best pattern of a search, and the search's history.
 
     Args:
-        pattern: 1 where open, 0 where opaque, shape (cells, cells); `vcc.Mask` takes it with a width.
-        error: R(K) of its kernel, as `vcc.analysis.expected_deblurring_error` has it.
-        history: the least R(K) met so far: of the first, random population, then after each generation.
+        pattern: 1 where open, 0 where opaque, shape (cells, cells); `vcc.Mask` accepts it with a width.
+        error: R(K) of its kernel, as in `vcc.analysis.expected_deblurring_error`.
+        history: the smallest R(K) so far: of the initial, random population, then after each generation.
         typical: the median R(K) of the survivors of each of these populations.
-        converged: whether it stopped because ``patience`` generations had brought nothing.
-        message: how it ended, for people.
+        converged: whether the search stopped because ``patience`` generations brought no improvement.
+        message: the status as text.
     """
 
     pattern: Array
@@ -42,7 +42,7 @@ class OptimisedAperture(Brief, Shown):
 
     @property
     def generations(self) -> int:
-        """How many were bred."""
+        """The number of generations after the initial population."""
         return len(self.history) - 1
 
 
@@ -61,34 +61,34 @@ def optimised_aperture(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> OptimisedAperture:
-    """A binary pattern with as little expected deblurring error R(K) as a genetic search finds.
+    """Search for a binary pattern with a small expected deblurring error R(K), by a genetic algorithm.
 
-    The algorithm of Zhou and Nayar, "What are good apertures for defocus deblurring?", ICCP 2009, section 4, and
-    its parameters: a random population of patterns; of each generation the best survive, and breed until the
-    population is whole again. Two survivors drawn at random are copied; each pair of their bits is exchanged with
-    the probability ``exchange``; then each bit flips with the probability ``mutation``. Survivors stay as they
-    are, so the best one is never lost. The search finds good patterns, not provably the best one.
+    Algorithm and parameters are those of Zhou and Nayar, "What are good apertures for defocus deblurring?",
+    ICCP 2009, section 4. From a random population of patterns, the best of each generation survive and breed
+    until the population is complete again. Two random survivors are copied; each pair of their bits is
+    exchanged with probability ``exchange``; then each bit flips with probability ``mutation``. Survivors are
+    not changed, so the best pattern is never lost. The search finds good patterns, not provably the best one.
 
     Args:
-        noise: σ, in the units of the picture, as light through the whole opening makes it.
-        power: |F₀|² of pictures, shape (rows, columns), as `natural_image_power` has it. The search takes time in
-            proportion to its size; 64×64 is fine enough for a blur of 13 pixels.
-        cells: of the pattern, a side.
-        pixels_per_cell: how wide the blur of a cell is. The kernel is the pattern in pixels, divided by the
-            number of its pixels: its sum is the share of light that passes.
-        population: patterns of a generation.
-        survivors: of them.
-        generations: bred at most.
-        exchange: probability that the two parents' bits at a place change sides.
+        noise: σ, in units of the image that light through the whole opening makes.
+        power: |F₀|² of images, shape (rows, columns), as `natural_image_power` returns it. The run time is
+            proportional to its size; 64×64 suffices for a blur of 13 pixels.
+        cells: number of cells of the pattern per side.
+        pixels_per_cell: width of the blur of a cell. The kernel is the pattern in pixels, divided by its pixel
+            count: its sum is the share of light that passes.
+        population: number of patterns in a generation.
+        survivors: number of survivors.
+        generations: largest number of generations.
+        exchange: probability that the parents' bits at a position are exchanged.
         mutation: probability that a child's bit flips.
-        patience: stop after so many generations without a better pattern; None breeds them all.
-        seed: of the random numbers; the same seed finds the same pattern.
-        progress: called with (generations bred, generations) after each, first with 0. What it raises ends the
+        patience: stop after this many generations without a better pattern; None uses all generations.
+        seed: of the random numbers; the same seed gives the same pattern.
+        progress: called with (generations done, generations) after each, first with 0. An exception in it ends the
             search.
 
     Raises:
-        InputError: a noise of zero or less, powers that are negative or not finite, a kernel larger than the
-            picture, fewer than 2 survivors or no more patterns than survivors, or probabilities outside 0 to 1.
+        InputError: a noise that is not positive, powers that are negative or not finite, a kernel larger than the
+            image, fewer than 2 survivors, no more patterns than survivors, or probabilities outside 0 to 1.
     """
     _check_search(cells, pixels_per_cell, population, survivors, generations, patience)
     prior = checked_power(noise, power)
@@ -118,7 +118,7 @@ def optimised_aperture(
         errors = np.concatenate([errors, errors_of(children)])
     pattern = bits[0].astype(np.float64)
     kernel = np.kron(pattern, np.ones((pixels_per_cell, pixels_per_cell))) / (cells * pixels_per_cell) ** 2
-    # The search is in single precision; a dark pattern, the best of dark ones only, has no kernel.
+    # The search uses single precision; a dark pattern (if all are dark) has no kernel.
     error = expected_deblurring_error(kernel, noise, prior) if pattern.any() else history[-1]
     message = _ended(converged, done, waited)
     return OptimisedAperture(pattern, error, tuple(history), tuple(typical), converged, message)
@@ -126,8 +126,8 @@ def optimised_aperture(
 
 def _ended(converged: bool, done: int, waited: int) -> str:
     if converged:
-        return f"converged: {waited} generations brought nothing better; {done} bred"
-    vain = f", the last {waited} of which brought nothing better" if waited else ""
+        return f"converged: {waited} generations without improvement; {done} in all"
+    vain = f", the last {waited} of them without improvement" if waited else ""
     return f"stopped after all {done} generations{vain}"
 
 
@@ -138,8 +138,8 @@ class _Errors:
         self.shape = prior.shape
         self.pixels_per_cell = pixels_per_cell
         self.pixels = (cells * pixels_per_cell) ** 2
-        # R = Σ σ²P/(|K|²P + σ²) over all frequencies, of which a real transform has half: P may differ between
-        # f and −f, |K|² does not. What is not in the half stands at the place of its conjugate.
+        # R = Σ σ²P/(|K|²P + σ²) over all frequencies, of which a real transform has half. P may differ
+        # between f and −f, |K|² does not. The other half of P is stored at the positions of the conjugates.
         mirrored = np.roll(prior[::-1, ::-1], (1, 1), axis=(0, 1))
         half = prior.shape[1] // 2 + 1
         alone = np.zeros(half, bool)
@@ -149,7 +149,7 @@ class _Errors:
         self.noise = np.float32(noise**2)
 
     def __call__(self, bits: NDArray[np.bool_]) -> Array:
-        """Of patterns (n, cells, cells): shape (n,)."""
+        """R(K) of patterns (n, cells, cells): shape (n,)."""
         from scipy import fft
 
         found = np.zeros(len(bits))
@@ -202,5 +202,5 @@ def _check_search(
     checks.whole_number_between("survivors", survivors, 2, way_out="fewer cannot breed")
     if int(population) != population or population <= survivors:
         raise InputError(
-            f"a population of {population} leaves no place for children of {survivors} survivors: make it larger"
+            f"a population of {population} leaves no children besides {survivors} survivors: make it larger"
         )

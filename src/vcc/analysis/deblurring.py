@@ -1,4 +1,4 @@
-"""How well a blur can be undone: Zhou and Nayar's figure of merit of aperture patterns."""
+"""The expected deblurring error of aperture patterns: Zhou and Nayar's figure of merit."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ Array = NDArray[np.float64]
 
 
 def expected_deblurring_error(kernel: ArrayLike, noise: float, power: ArrayLike) -> float:
-    """R(K), the expected squared error of a picture deblurred as well as a linear filter can.
+    """R(K), the expected squared error of an image after optimal linear deblurring.
 
     R(K) = Σ σ² / (|K|² + σ²/|F₀|²) over all frequencies (Zhou and Nayar, "What are good apertures for defocus
-    deblurring?", ICCP 2009, where it is minimised over K): what the Wiener filter leaves of a picture of expected
-    power |F₀|², blurred by K, with white noise of standard deviation σ. Divided by the number of frequencies it is
-    the expected mean squared error of a pixel; smaller is better.
+    deblurring?", ICCP 2009, where it is minimised over K). It is the remaining error of the Wiener filter for
+    an image of expected power |F₀|², blurred by K, with white noise of standard deviation σ. Divided by the
+    number of frequencies, it is the expected mean squared error of a pixel; smaller is better.
 
     Args:
-        kernel: the blur in pixels, 0 or more, shape (rows, columns). Its sum is the share of light that the
-            aperture passes: patterns are compared at one exposure by kernels that sum to their transmission.
-        noise: σ, in the units of the picture.
-        power: |F₀|² of pictures at the frequencies of a discrete transform, shape (rows, columns), zero frequency
-            first, as `natural_image_power` has it: for the unitary transform, so that white noise has σ²
-            everywhere.
+        kernel: the blur in pixels, not negative, shape (rows, columns). Its sum is the share of light that the
+            aperture passes: to compare patterns at equal exposure, their kernels sum to their transmission.
+        noise: σ, in the units of the image.
+        power: |F₀|² of images at the frequencies of a discrete transform, shape (rows, columns), zero frequency
+            first, as `natural_image_power` returns it: for the unitary transform, so that white noise is σ² at
+            each frequency.
 
     Returns:
-        R(K), in squared units of the picture, summed over the frequencies.
+        R(K), in squared units of the image, summed over the frequencies.
 
     Raises:
-        InputError: a kernel larger than the picture, negative, not finite or dark; a noise of zero or less; powers
-            that are negative or not finite.
+        InputError: a kernel larger than the image, negative, not finite or dark; a noise that is not
+            positive; powers that are negative or not finite.
     """
     blur = np.asarray(kernel, dtype=np.float64)
     prior = checked_power(noise, power)
@@ -46,15 +46,15 @@ def expected_deblurring_error(kernel: ArrayLike, noise: float, power: ArrayLike)
             f"{prior.shape[0]}×{prior.shape[1]}: take a larger picture or a smaller blur"
         )
     transfer = np.abs(np.fft.fft2(blur, s=prior.shape)) ** 2
-    # σ²/(|K|² + σ²/|F₀|²), written so that a frequency without power brings no error.
+    # σ²/(|K|² + σ²/|F₀|²), in a form that gives 0 at frequencies without power.
     return float(np.sum(noise**2 * prior / (transfer * prior + noise**2)))
 
 
 def checked_power(noise: float, power: ArrayLike) -> Array:
-    """|F₀|² of pictures as `expected_deblurring_error` takes it, float64.
+    """|F₀|² of images for `expected_deblurring_error`, checked, float64.
 
     Raises:
-        InputError: a noise of zero or less, or powers that are negative or not finite.
+        InputError: a noise that is not positive, or powers that are negative or not finite.
     """
     prior = np.asarray(power, dtype=np.float64)
     checks.above_zero("noise", noise, "a standard deviation")
@@ -66,20 +66,20 @@ def checked_power(noise: float, power: ArrayLike) -> Array:
 def natural_image_power(
     shape: tuple[int, int], standard_deviation: float = 0.2, mean: float = 0.5, exponent: float = 2.0
 ) -> Array:
-    """The expected power |F₀|² of natural pictures: falling as 1/frequency² (Field 1987; Zhou and Nayar 2009).
+    """The expected power |F₀|² of natural images: proportional to 1/frequency² (Field 1987; Zhou and Nayar 2009).
 
     Args:
-        shape: (rows, columns) of the picture.
+        shape: (rows, columns) of the image.
         standard_deviation: of its pixels about their mean.
         mean: of its pixels.
         exponent: of the frequency in cycles per pixel.
 
     Returns:
-        Shape (rows, columns), zero frequency first, for the unitary transform: the powers other than the mean's
-        have the mean ``standard_deviation``² over all frequencies.
+        Shape (rows, columns), zero frequency first, for the unitary transform: the mean over all frequencies,
+        without the power of the mean, is ``standard_deviation``².
 
     Raises:
-        InputError: a shape of fewer than 2 pixels, or a standard deviation or mean that is not above 0.
+        InputError: a shape of fewer than 2 pixels, or a standard deviation or mean that is not positive.
     """
     if math.prod(checks.counts("shape", shape, "rows", "columns")) < 2:
         raise InputError(f"shape is (rows, columns) of two pixels or more, not {shape}")

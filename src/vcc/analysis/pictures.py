@@ -1,4 +1,4 @@
-"""Spectra drawn: planes through a 4-D spectrum in their frame, and 2-D spectra."""
+"""Plots of spectra: planes through a 4-D spectrum, placed by its frame, and 2-D spectra."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DECADES = 5.0
-"""Of power shown, from the strongest down."""
+"""Range of power shown, from the strongest down, in decades."""
 
 
 def plot_spectrum(
@@ -30,19 +30,19 @@ def plot_spectrum(
     decades: float = DECADES,
     axes: Axes | None = None,
 ) -> Axes:
-    """Draw a light field's spectrum across two coordinates, each frequency's cell placed by the frame.
+    """Draw a light field's spectrum over two coordinates, each frequency's cell placed by the frame.
 
-    Nothing is resampled: flight shows as a shear along fs, a lens as one along fu.
+    Nothing is resampled: free propagation is visible as a shear along fs, a lens as a shear along fu.
 
     Args:
         spectrum: see `fft4`.
-        across: the coordinates drawn to the right and up, two of ``"u"``, ``"v"``, ``"s"``, ``"t"``.
-        of: ``"power"`` sums |F|² over the other two axes, ``"section"`` takes the plane through their zero.
-        decades: of power shown, from the strongest down; weaker is black.
+        across: the horizontal and the vertical coordinate, two of ``"u"``, ``"v"``, ``"s"``, ``"t"``.
+        of: ``"power"`` sums |F|² over the other two axes, ``"section"`` shows the plane through their zero.
+        decades: range of power shown, from the strongest down; weaker power is black.
         axes: where to draw; None makes a new figure.
 
     Raises:
-        InputError: other coordinates, another ``of``, or decades of zero or less.
+        InputError: invalid coordinates or ``of``, or decades that are not positive.
     """
     _check_decades(decades)
     if of == "power":
@@ -70,15 +70,15 @@ def plot_spectrum(
 
 
 def plot_plane_spectrum(spectrum: PlaneSpectrum, *, decades: float = DECADES, axes: Axes | None = None) -> Axes:
-    """Draw the power of a 2-D spectrum: of a picture, a mask, a transfer function.
+    """Draw the power of a 2-D spectrum: of an image, a mask, or a transfer function.
 
     Args:
         spectrum: channels are summed.
-        decades: of power shown, from the strongest down; weaker is black.
+        decades: range of power shown, from the strongest down; weaker power is black.
         axes: where to draw; None makes a new figure.
 
     Raises:
-        InputError: decades of zero or less.
+        InputError: decades that are not positive.
     """
     _check_decades(decades)
     power = np.abs(spectrum.values).astype(np.float64) ** 2
@@ -89,7 +89,7 @@ def plot_plane_spectrum(spectrum: PlaneSpectrum, *, decades: float = DECADES, ax
     )
     axes = style.new_axes(5.2, 4.2) if axes is None else axes
     _draw(axes, corners[..., 0] * 1e-3, corners[..., 1] * 1e-3, power, decades)
-    axes.invert_yaxis()  # y points down, as in pictures
+    axes.invert_yaxis()  # y points down, as in images
     style.tidy(axes, "fx [cycles/mm]", "fy [cycles/mm]")
     return axes
 

@@ -1,4 +1,4 @@
-"""Spectra of what is flat: pictures, masks, and the kernels of diffusers."""
+"""2-D spectra: of images, masks, and the kernels of diffusers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from vcc.shapes.patterns import Pattern, as_pattern
 Array = NDArray[np.float64]
 
 BLOCK_BYTES = 2**24
-"""Of values that are transformed together, so that the copies made on the way stay small."""
+"""Size of the values transformed together, which limits the memory for temporary copies."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,7 +31,7 @@ class PlaneSpectrum(Shown):
     Args:
         values: shape (rows of fy, columns of fx[, channels]), zero frequency in the middle (index n // 2).
         frame: maps (column, row, 1) to (fx, fy, 1), cycles per metre.
-        origin: the place (x, y) in metres about which phases are.
+        origin: the position (x, y) in metres to which phases refer.
     """
 
     values: NDArray[Any]
@@ -68,7 +68,7 @@ class PlaneSpectrum(Shown):
         return frequencies[kept][order], values[kept][order]
 
     def about_zero(self) -> NDArray[np.complex128]:
-        """The values with phases about the place (0, 0): shape as `values`, complex128."""
+        """The values with phases relative to the position (0, 0): shape of `values`, complex128."""
         rows, columns = self.shape[:2]
         index = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1)
         phase = np.exp(-2j * np.pi * (self.frame(index) @ np.array(self.origin)))
@@ -79,10 +79,10 @@ class PlaneSpectrum(Shown):
 
 
 def picture_spectrum(image: Image) -> PlaneSpectrum:
-    """The spectrum of a picture: values × m², phases about the pixel in the middle (index n // 2).
+    """The spectrum of an image: values × m², phases relative to the middle pixel (index n // 2).
 
     Args:
-        image: of any frame; frequencies go with the frame's inverse transpose.
+        image: with any frame; the frame of the frequencies is its inverse transpose.
 
     Raises:
         InputError: values that are not finite, or a frame that cannot be inverted.
@@ -120,19 +120,19 @@ def plane_spectrum(values: ArrayLike, frame: Affine) -> PlaneSpectrum:
 def mask_spectrum(
     mask: Mask | Pattern, width: float, *, height: float | None = None, samples: int = 512
 ) -> PlaneSpectrum:
-    """The spectrum of what a mask lets through, over a rectangle about the mask's middle.
+    """The spectrum of a mask's transmission over a rectangle, centred on the mask.
 
-    The mask's means over cells of ``width / samples`` are transformed, so that frequencies are those of the mask
-    times sinc(fx·cell)·sinc(fy·cell). A mask that goes on beyond the rectangle is cut by it.
+    The mask's means over cells of ``width / samples`` are transformed, so the result is the mask's spectrum times
+    sinc(fx·cell)·sinc(fy·cell). A mask that extends beyond the rectangle is cropped.
 
     Args:
-        mask: an element, or a pattern alone; coordinates are centred on it.
+        mask: an element, or a pattern; coordinates are relative to its centre.
         width: of the rectangle, metres.
-        height: metres; None takes the width.
+        height: of the rectangle, metres; None uses the width.
         samples: cells across the width.
 
     Raises:
-        InputError: a size of zero or less, or fewer than one sample.
+        InputError: a size that is not positive, or fewer than one sample.
     """
     height = width if height is None else height
     checks.sizes("the rectangle whose spectrum is taken", width=width, height=height)
@@ -143,21 +143,21 @@ def mask_spectrum(
     rows = max(1, round(height / cell))
     down = height / rows
     x, y = (np.arange(samples) - samples // 2) * cell, (np.arange(rows) - rows // 2) * down
-    # The rectangle's cells are centred on the middle cell, so that a symmetric mask has a real spectrum.
+    # The cells are centred on the middle cell, so that a symmetric mask has a real spectrum.
     means = np.broadcast_to(pattern.mean(x[None, :], y[:, None], cell, down), (rows, samples))
     frame = Affine.scaling(cell, down) @ Affine.translation(-(samples // 2), -(rows // 2))
     return plane_spectrum(means, frame)
 
 
 def kernel_spectrum(kernel: Kernel, fs: ArrayLike, ft: ArrayLike, *, points: int = 256) -> NDArray[np.complex128]:
-    """What a diffuser multiplies a light field's spectrum by: ∫∫ D exp(−2πi (fs·δs + ft·δt)) dδs dδt.
+    """The factor of a diffuser on a light field's spectrum: ∫∫ D exp(−2πi (fs·δs + ft·δt)) dδs dδt.
 
     Args:
         kernel: D(δs, δt), of integral 1.
-        fs: cycles per unit of slope; broadcast against ``ft``.
+        fs: cycles per unit of slope; broadcast with ``ft``.
         ft: cycles per unit of slope.
-        points: along each axis of the quadrature (`Kernel.quadrature`); right while the kernel spans far fewer
-            periods than that.
+        points: of the quadrature along each axis (`Kernel.quadrature`); accurate if the kernel spans far fewer
+            periods than this.
 
     Returns:
         Shape of the broadcast frequencies, complex128; 1 at zero frequency.
@@ -178,8 +178,8 @@ def transformed_along(values: NDArray[np.complex64], axis: int, *, inverse: bool
 
     Args:
         values: complex64, two axes or more; overwritten.
-        axis: along which.
-        inverse: whether to undo it (divided by n).
+        axis: of the transform.
+        inverse: whether to apply the inverse transform (divided by n).
     """
     across = next(n for n in range(values.ndim) if n != axis)
     step = max(1, BLOCK_BYTES * values.shape[across] // max(values.nbytes, 1))

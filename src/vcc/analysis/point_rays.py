@@ -1,10 +1,10 @@
-"""The rays of a point of light through a camera, and where on the sensor they fall.
+"""Trace the rays of a point of light through a camera to the sensor.
 
-Rays are sent forwards, through the same stages and faces that captures are made with. Without diffusers the
-entrance opening is divided into cells; each carries its mean transmission and falls on the sensor as the box that
-its own rays span (a ray differential: Igehy, "Tracing ray differentials", 1999): nothing is random, and nothing
-singular in focus. With diffusers rays are drawn from a scrambled Sobol' sequence over the opening and each
-diffuser's kernel.
+Rays are traced forwards, through the same stages and faces as captures. Without diffusers, the entrance opening is
+divided into cells. Each carries its mean transmission and covers a box on the sensor, spanned by its own rays
+(a ray
+differential: Igehy, "Tracing ray differentials", 1999): the result is not random, and not singular in focus. With
+diffusers, rays are drawn from a scrambled Sobol' sequence over the opening and each diffuser's kernel.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 CELLS_PER_PIXEL = 16
-"""Of the opening, along a pixel of the picture: borders are right to 1/64 of a pixel's light, while there are no
-more than `ENOUGH_CELLS` for that."""
+"""Cells of the opening per pixel of the image: borders are accurate to 1/64 of a pixel's light, unless more than
+`ENOUGH_CELLS` would be needed."""
 FEWEST_CELLS, ENOUGH_CELLS, MOST_CELLS = 128, 512, 4096
-"""Across the longer side of the opening: in any case; where pixels ask for more; where each needs at least one."""
+"""Cells along the longer side of the opening: at least; at most for this accuracy; at most for one per pixel."""
 FIRST_CELLS = 64
-"""For a look at how large the picture will be."""
+"""Cells of the first pass, which estimates the size of the image."""
 NO_LIGHT = 1e-6
-"""Means of patterns are differences of integrals, whose rounding is below this."""
+"""Smaller means of patterns count as 0: they are rounding errors of differences of integrals."""
 NEARBY = 1e-3
-"""Of a cell: how far from its middle the rays go that measure its box on the sensor."""
+"""Distance from a cell's centre, in cells, of the rays that measure its box on the sensor."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spot(Brief):
-    """Where light falls: places on the sensor (n, 2), widths of boxes (n, 2), weights (n,)."""
+    """Light on the sensor: positions (n, 2), widths of boxes (n, 2), weights (n,)."""
 
     places: Array
     widths: Array
@@ -54,9 +54,9 @@ class PointRays:
     Args:
         camera: any.
         distance: of the point before the entrance plane, metres; may be infinite.
-        field: where it stands, as slopes (X/Z, Y/Z).
-        middle: of the rectangle, metres.
-        size: its (width, height), metres; infinite where nothing bounds it.
+        field: direction of the point, as slopes (X/Z, Y/Z).
+        middle: centre of the rectangle, metres.
+        size: (width, height) of the rectangle, metres; infinite if unbounded.
     """
 
     camera: Train
@@ -67,12 +67,12 @@ class PointRays:
 
     @classmethod
     def through_stops(cls, camera: Train, distance: float, field: Pair) -> PointRays:
-        """Those that the camera's stops let pass.
+        """The rays that pass the camera's stops.
 
-        Stops behind what bends or scatters rays tell nothing about where they came from, and are passed over.
+        Stops behind elements that bend or scatter rays are ignored: they do not bound the rays at the entrance.
 
         Raises:
-            InputError: no stop bounds them, or none of them passes.
+            InputError: no stop bounds the rays, or none passes.
         """
         rays = cls(camera, distance, field)
         low, high = np.full(2, -np.inf), np.full(2, np.inf)
@@ -96,7 +96,7 @@ class PointRays:
         return cls(camera, distance, field, (x, y), (width, height))
 
     def _seen_from_the_entrance(self, stage: Stage) -> Array | None:
-        """The corners of a stage's opening, (4, 2), where the point's rays to them cross the entrance plane."""
+        """The corners of a stage's opening, (4, 2), projected along the point's rays to the entrance plane."""
         size = (math.inf, math.inf) if stage.faces.pattern is None else stage.faces.pattern.size
         at = stage.arriving(self.from_places(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))[:, :2]
         stage_from_entrance = Affine.from_parts(np.stack([at[1] - at[0], at[2] - at[0]], axis=1), at[0])
@@ -106,7 +106,7 @@ class PointRays:
         return stage_from_entrance.inverse()(corners + stage.element.decentre)
 
     def from_places(self, places: Array) -> Array:
-        """The rays (u, v, s, t) of the point through places (..., 2) of the entrance plane."""
+        """The rays (u, v, s, t) of the point through positions (..., 2) of the entrance plane."""
         slopes = places / self.distance - np.asarray(
             self.field
         )  # s = (u − X)/Z; parallel for an infinite distance
@@ -114,7 +114,7 @@ class PointRays:
 
     @property
     def image(self) -> Array:
-        """(x, y) on the sensor where the affine optics send the ray through the middle, metres."""
+        """(x, y) on the sensor of the ray through the centre by affine optics, metres."""
         to_sensor = self.camera.rays_at(self.camera.sensor.z)
         return np.asarray(to_sensor(self.from_places(np.array(self.middle)))[:2])
 
@@ -122,20 +122,19 @@ class PointRays:
         """The light of each cell of the opening.
 
         Args:
-            cells: how many its longer side is divided into at least; None takes as many as the picture's size
-                asks for.
-            steps: (horizontal, vertical) pitch of the pixels that the light is counted in, metres.
+            cells: smallest number along the longer side; None chooses it by the size of the image.
+            steps: (horizontal, vertical) pitch of the pixels that collect the light, metres.
 
         Raises:
-            InputError: pixels so fine that `MOST_CELLS` do not fill them.
+            InputError: pixels so fine that `MOST_CELLS` are not enough.
         """
         first = self._traced(FIRST_CELLS if cells is None else cells)
         lit = first.weights > 0
-        if not lit.any():  # what passes may be smaller than the first cells' middles show
+        if not lit.any():  # openings may be smaller than these cells
             return self._traced(ENOUGH_CELLS)
-        # A few boxes may be large where optics are strongly curved: the bulk decides.
+        # A few boxes may be large if optics are strongly curved: use a quantile.
         widest = float(np.quantile((first.widths[lit] / steps).max(axis=1), 0.99))
-        least = math.ceil(widest * (FIRST_CELLS if cells is None else cells))  # one cell for each pixel
+        least = math.ceil(widest * (FIRST_CELLS if cells is None else cells))  # one cell per pixel
         if least > MOST_CELLS:
             raise InputError(
                 f"this point's picture is about {least} pixels wide, and {MOST_CELLS} cells of the opening are "
@@ -151,7 +150,7 @@ class PointRays:
         x, y = ((np.arange(n) - (n - 1) / 2) * c + m for n, c, m in zip(counts, cell, self.middle, strict=True))
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         near = NEARBY * cell
-        # Three rays a cell: its middle, and one beside it along each axis.
+        # Three rays per cell: its centre, and one next to it along each axis.
         rays = np.stack([self.from_places(places + near * beside) for beside in ((0, 0), (1, 0), (0, 1))])
         share = np.full(len(places), 1.0 / len(places))
         for stage in self.camera.stages:
@@ -163,11 +162,12 @@ class PointRays:
         return Spot(rays[0, :, :2], _box(rays), share)
 
     def drawn(self, rays: int, seed: int) -> list[Spot]:
-        """Rays over the opening and the kernels of diffusers, in two halves that are even sets themselves.
+        """Rays drawn over the opening and the kernels of diffusers, in two halves that are each evenly
+        distributed.
 
         Args:
             rays: how many, rounded up to a power of two.
-            seed: of their choice.
+            seed: of the random numbers.
         """
         from scipy.stats import qmc
 
@@ -199,13 +199,13 @@ class PointRays:
 
 
 def _box(rays: Array) -> Array:
-    """Widths (n, 2) of boxes of the same variance as the parallelograms that cells' rays span."""
+    """Widths (n, 2) of boxes with the variance of the parallelograms that the cells' rays span."""
     along = (rays[1:, :, :2] - rays[0, :, :2]) / NEARBY
     return np.asarray(np.sqrt((along**2).sum(axis=0)))
 
 
 def _mean_transmission(stage: Stage, rays: Array) -> Array:
-    """What a pattern lets pass of each cell: its mean over the cell's box where all boxes are alike."""
+    """A pattern's transmission of each cell: its mean over the cell's box if all boxes are equal."""
     pattern = stage.faces.pattern
     assert pattern is not None
     x, y = (rays[0, :, :2] - stage.element.decentre).T
@@ -219,7 +219,7 @@ def _mean_transmission(stage: Stage, rays: Array) -> Array:
 
 
 def _deflections(spread: Scatter, x: Array, y: Array, numbers: list[Array]) -> Array:
-    """Changes of slope (n, 2) by the kernels at places x, y, drawn by evenly spread numbers."""
+    """Changes of slope (n, 2) by the kernels at positions x, y, drawn with evenly distributed numbers."""
     shares, widths = spread.at(x, y)
     chosen = np.zeros(len(x), dtype=np.int64)
     if len(spread.kernels) > 1:

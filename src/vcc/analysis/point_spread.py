@@ -1,8 +1,8 @@
-"""What a camera makes of a point: its point spread function, and from it OTF and MTF.
+"""The point spread function of a camera, with OTF and MTF.
 
-A point's rays fill a 2-D sheet of the 4-D light field: traced backwards from a pixel, a ray hits it with
-probability 0. So rays are sent forwards (`vcc.analysis.point_rays`), and their light is shared among pixels by
-exact overlap; where diffusers scatter them, the sampling error is told.
+A point's rays form a 2-D sheet of the 4-D light field: a ray traced backwards from a pixel hits it with
+probability 0. Therefore rays are traced forwards (`vcc.analysis.point_rays`), and their light is distributed
+to pixels by exact overlap. If diffusers scatter them, the sampling error is reported.
 """
 
 from __future__ import annotations
@@ -27,36 +27,36 @@ from vcc.camera import Camera
 Array = NDArray[np.float64]
 
 RAYS = 2**18
-"""Where diffusers scatter."""
+"""Default number of rays with diffusers."""
 LARGEST = 4096
-"""Pixels a side of a point's picture whose size was not given."""
+"""Largest number of pixels per side of a point's image, unless its size is given."""
 ROUNDING = 1e-9
-"""Of shares of pixels that are summed."""
+"""Tolerance for sums of shares of pixels."""
 FINE_SIDE, MOST_PARTS = 512, 32
-"""Pixels are divided for spectra, into as many parts a side as fit on `FINE_SIDE`. Counted in whole pixels the
-spectrum of a disc 1.3 pixels wide is aliased by 0.37, of 40 pixels by 0.002; in 1/32 of a pixel even that of a
-point by less than (π/2/32)²/6 = 4e-4 along an axis."""
+"""For spectra, pixels are divided into parts, as many per side as fit in `FINE_SIDE`. With whole pixels,
+aliasing in the spectrum of a disc 1.3 pixels wide is 0.37, of 40 pixels 0.002; with 1/32 of a pixel, aliasing
+even of a point's spectrum is below (π/2/32)²/6 = 4e-4 along an axis."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PointSpread(Shown):
-    """The picture of a point of light.
+    """The image of a point of light.
 
     Args:
-        values: the share of the light arriving at the sensor's plane that falls into each pixel, shape (rows,
-            columns), as light lands on the sensor; they sum to 1 − ``outside``.
+        values: the share of the light at the sensor's plane in each pixel, shape (rows, columns), inverted as
+            on the sensor; the sum is 1 − ``outside``.
         frame: maps (column, row, 1) to (x, y, 1) on the sensor, metres.
         distance: of the point before the entrance plane, metres.
-        field: where it stands, as slopes (X/Z, Y/Z).
-        collecting_area: the part of the entrance plane whose light arrives, transmissions counted, m². A point of
-            radiant intensity I (W/sr) at distance Z brings I · collecting_area / Z² watts to the sensor's plane.
-        outside: the share of the light that falls beside ``values``.
-        sampling_error: estimated, root mean square over the pixels, in units of the values; 0 without diffusers.
-        finer: the same light in parts of the pixels, from which spectra are computed; None where pixels are fine
-            already.
+        field: direction of the point, as slopes (X/Z, Y/Z).
+        collecting_area: the part of the entrance plane whose light arrives, weighted by transmission, m². A
+            point of radiant intensity I (W/sr) at distance Z gives I · collecting_area / Z² watts at the
+            sensor's plane.
+        outside: the share of the light outside ``values``.
+        sampling_error: estimate, root mean square over the pixels, in units of the values; 0 without diffusers.
+        finer: the same light in parts of the pixels, used for spectra; None if the pixels are fine enough.
 
     Raises:
-        InputError: other light in ``finer`` than in ``values``.
+        InputError: the light in ``finer`` differs from ``values``.
     """
 
     values: Array
@@ -73,7 +73,7 @@ class PointSpread(Shown):
             return
         light = _in_pixels(self.finer.values, self.finer.frame, self.frame, self.shape)
         if not np.allclose(light, self.values, rtol=0, atol=ROUNDING):
-            raise InputError("finer holds other light than values, whose parts it is: replace both, or finer=None")
+            raise InputError("the light in finer differs from values: replace both, or pass finer=None")
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -83,7 +83,7 @@ class PointSpread(Shown):
 
     @property
     def centroid(self) -> tuple[float, float]:
-        """The mean place (x, y) of the light within ``values``, metres on the sensor."""
+        """The centroid (x, y) of the light within ``values``, metres on the sensor."""
         rows, columns = self.shape
         share = self.values / self.values.sum()
         x, y = self.frame([share.sum(axis=0) @ np.arange(columns), share.sum(axis=1) @ np.arange(rows)])
@@ -108,27 +108,27 @@ def psf(
     rays: int = RAYS,
     seed: int = 0,
 ) -> PointSpread:
-    """The picture of a point of light, by tracing its rays through the camera.
+    """The image of a point of light, by tracing its rays through the camera.
 
     Args:
-        camera: any; only the sensor's place, pitch and lattice matter, not its size. Paraxial and geometric.
-        distance: of the point before the entrance plane, metres, above 0; may be infinite.
-        field: where the point stands as slopes (X/Z, Y/Z): the tangents of its field angles, right and down.
-        pitch: of the square pixels that the light is counted in, metres; None takes the sensor's.
-        shape: (rows, columns) of pixels; None takes an odd number each way that holds all light.
-        on_pixels: False centres the middle pixel (index n // 2) on where the middle of the opening images the
-            point through the camera's affine optics; True takes the sensor's own pixels (then no ``pitch``).
-        aperture: (width, height) of the entrance plane through which light comes, metres; None finds it from the
+        camera: any; of the sensor only position, pitch and lattice matter, not the size. Paraxial and geometric.
+        distance: of the point before the entrance plane, metres, positive; may be infinite.
+        field: direction of the point, as slopes (X/Z, Y/Z): the tangents of its field angles, right and down.
+        pitch: of the square pixels that collect the light, metres; None uses the sensor's.
+        shape: (rows, columns) of pixels; None uses odd numbers that contain all light.
+        on_pixels: False centres the middle pixel (index n // 2) on the image of the point through the centre
+            of the opening, by affine optics; True uses the sensor's own pixels (then without ``pitch``).
+        aperture: (width, height) of the opening in the entrance plane, metres; None determines it from the
             camera's stops.
-        cells: without diffusers: how many the opening's longer side is divided into; None takes 16 for each pixel
-            of the picture, from 128 to 512. There are more where a cell would otherwise cover more than a pixel.
+        cells: without diffusers: how many divide the opening's longer side; None uses 16 per pixel of the image,
+            from 128 to 512. More are used if a cell would cover more than a pixel.
         rays: with diffusers: how many are traced, rounded up to a power of two.
-        seed: of their choice.
+        seed: of the random numbers.
 
     Raises:
-        InputError: a distance of zero or less, a camera without a stop before its first plate, array or diffuser
-            (then give ``aperture``), no light on the sensor, a picture of more than 4096 pixels a side, pixels
-            finer than cells can fill, or what elements refuse.
+        InputError: a distance that is not positive, a camera without a stop before its first plate, array or
+            diffuser (then pass ``aperture``), no light on the sensor, an image of more than 4096 pixels per
+            side, pixels too fine for the number of cells, or an error of an element.
     """
     _check(camera, distance, field, pitch, on_pixels, cells, rays)
     if aperture is None:
@@ -150,7 +150,7 @@ def psf(
     pictures = [_in_pixels(each, fine_frame, frame, counts) for each in fine]
     values = np.sum(pictures, axis=0)
     error = 0.0
-    if scatters:  # two even halves of the rays: half their difference estimates the error of their mean
+    if scatters:  # half the difference of two even halves estimates the error of their mean
         error = float(np.sqrt(np.mean((pictures[0] - pictures[1]) ** 2)))
     area = total * point.size[0] * point.size[1]
     outside = 1 - float(values.sum())
@@ -161,23 +161,24 @@ def psf(
 
 
 def otf(point_spread: PointSpread, *, shape: tuple[int, int] | None = None, pixel: bool = True) -> PlaneSpectrum:
-    """The optical transfer function: the spectrum of a point's picture, 1 at zero frequency.
+    """The optical transfer function: the spectrum of a point's image, 1 at zero frequency.
 
-    It is that of the light before pixels sample it: not aliased, however large the pixels of a point spread by
-    `psf` are. Of values without ``finer`` parts it is the discrete transform, which is aliased.
+    For a point spread from `psf`, it is the spectrum of the light before sampling by pixels, and so not
+    aliased for any size of pixels. For values without ``finer`` parts it is the discrete transform, which is
+    aliased.
 
     Args:
         point_spread: of any camera.
-        shape: (rows, columns) to fill up with darkness to, which brings frequencies closer; None adds none.
-        pixel: whether the pixels that light was counted in, sinc(fx·pitch)·sinc(fy·pitch), are part of it: the
-            system's OTF; False divides them out: the optics' alone.
+        shape: (rows, columns) after zero padding, for finer frequencies; None does not pad.
+        pixel: whether to include the pixels that collected the light, sinc(fx·pitch)·sinc(fy·pitch): the OTF of
+            the system; False divides by it: the OTF of the optics.
 
     Returns:
-        Complex values; frequencies in cycles per metre on the sensor; phases about the middle pixel (index n //
-        2).
+        Complex values; frequencies in cycles per metre on the sensor; phases relative to the middle pixel (index
+        n // 2).
 
     Raises:
-        InputError: a shape smaller than the picture's, or no light in it.
+        InputError: a shape smaller than the image, or no light in it.
     """
     rows, columns = point_spread.shape
     wanted = (rows, columns) if shape is None else (int(shape[0]), int(shape[1]))
@@ -212,7 +213,7 @@ def mtf(point_spread: PointSpread, *, shape: tuple[int, int] | None = None, pixe
 
 
 def _transformed(light: Array, frame: Affine, like: PlaneSpectrum) -> NDArray[np.complex128]:
-    """The spectrum of light in the pixels of a frame, at the frequencies and about the origin of another."""
+    """The spectrum of light in the pixels of a frame, at the frequencies and about the origin of ``like``."""
     rows, columns = light.shape
     (left, top), (right, bottom) = frame([[0, 0], [columns - 1, rows - 1]]) - like.origin
     along_x = np.exp(-2j * np.pi * np.outer(np.linspace(left, right, columns), like.frequencies("x")))
@@ -221,7 +222,7 @@ def _transformed(light: Array, frame: Affine, like: PlaneSpectrum) -> NDArray[np
 
 
 def _through_pixels(frame: Affine, at: PlaneSpectrum) -> Array:
-    """What the pixels of a frame along x and y leave of each frequency of a spectrum."""
+    """The transfer function of the pixels of a frame along x and y, at the frequencies of a spectrum."""
     horizontal, vertical = np.abs(np.diag(frame.linear))
     return np.outer(np.sinc(at.frequencies("y") * vertical), np.sinc(at.frequencies("x") * horizontal))
 
@@ -255,7 +256,7 @@ def _sizes(aperture: Sequence[float]) -> tuple[float, float]:
     return float(aperture[0]), float(aperture[1])
 
 
-# -- where its light is counted
+# -- the pixels that collect the light
 
 
 def _lattice(
@@ -295,7 +296,7 @@ def _lattice(
 
 
 def _divided(spots: list[Spot], frame: Affine, counts: tuple[int, int]) -> tuple[int, Affine, tuple[int, int]]:
-    """Into how many parts a side pixels are divided, and the lattice of the parts that are lit."""
+    """The number of parts per side of a pixel, and the lattice of the illuminated parts."""
     places, widths = (
         np.concatenate([each[spot.weights > 0] for spot, each in both])
         for both in ([(spot, spot.places) for spot in spots], [(spot, spot.widths) for spot in spots])
@@ -312,7 +313,7 @@ def _divided(spots: list[Spot], frame: Affine, counts: tuple[int, int]) -> tuple
 
 
 def _in_pixels(light: Array, fine: Affine, frame: Affine, counts: tuple[int, int]) -> Array:
-    """Light that was counted in parts of pixels, of one frame, in the pixels themselves, of another."""
+    """Light collected in parts of pixels, of one frame, summed to the pixels of another."""
     rows, columns = light.shape
     pixels_from_fine = frame.inverse() @ fine
     parts = round(1 / float(pixels_from_fine.linear[0, 0]))
@@ -324,7 +325,7 @@ def _in_pixels(light: Array, fine: Affine, frame: Affine, counts: tuple[int, int
 
 
 def _deposited(spot: Spot, frame: Affine, counts: tuple[int, int]) -> Array:
-    """Weights shared among pixels by the overlap of each box with them: shape (rows, columns)."""
+    """Weights distributed to pixels by the overlap of each box with them: shape (rows, columns)."""
     rows, columns = counts
     lit = spot.weights > 0
     index = frame.inverse()(spot.places[lit]) + 0.5  # pixel n reaches from n to n + 1

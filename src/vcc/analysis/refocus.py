@@ -1,11 +1,12 @@
-"""Refocusing by slices of the 4-D spectrum: one transform, then each new focus costs O(n² log n).
+"""Refocusing by slices of the 4-D spectrum: after one transform, each new focus costs O(n² log n).
 
-Ng, "Fourier slice photography", ACM Trans. Graph. 24(3), 2005: a refocused picture's 2-D spectrum is a slice
-through the light field's 4-D spectrum. A point at distance Z is seen at the pixel k = k₀ − S·i in view i; the mean
-over views along that has the spectrum Σ_i L̂_i(κ) exp(−2πi κ·S·i), which is the transform over views at the
-frequency Sᵀκ. It is taken from the transform on a grid by gridding: a Kaiser–Bessel kernel W samples wide on a
-grid finer by 1.5, the samples divided by the kernel's own transform before (Beatty, Nishimura and Pauly, "Rapid
-gridding reconstruction with a minimal oversampling ratio", IEEE Trans. Med. Imaging 24(6), 2005).
+Ng, "Fourier slice photography", ACM Trans. Graph. 24(3), 2005: the 2-D spectrum of a refocused image is a slice
+through the light field's 4-D spectrum. A point at distance Z is at pixel k = k₀ − S·i in view i. The mean
+over views along this line has the spectrum Σ_i L̂_i(κ) exp(−2πi κ·S·i), the transform over views at the
+frequency Sᵀκ. It is interpolated from the transform on a grid by gridding: a Kaiser–Bessel kernel of width W
+samples on a grid finer by 1.5, after division of the samples by the kernel's own transform (Beatty, Nishimura
+and Pauly, "Rapid gridding reconstruction with a minimal oversampling ratio", IEEE Trans. Med. Imaging 24(6),
+2005).
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ Array = NDArray[np.float64]
 TAPS = 6
 """Width of the gridding kernel in grid samples: its error is about exp(−β) = 5e-6."""
 FINER = 1.5
-"""How much finer than the views' own the grid of their frequencies is."""
+"""Oversampling of the grid of the views' frequencies."""
 BORDER = 16
-"""Pixels around each picture in which one border is led over to the opposite one."""
+"""Width in pixels of the added border on each side of an image, which blends opposite borders."""
 
 
 @dataclass(frozen=True, eq=False)
 class _ViewAxis:
-    """How one axis of views is put on a grid of frequencies.
+    """Maps one axis of views to a grid of frequencies.
 
     Args:
         views: how many there are.
@@ -48,17 +49,17 @@ class _ViewAxis:
 
     @property
     def size(self) -> int:
-        """Of the grid; 1 where there is one view only, whose transform is constant."""
+        """Size of the grid; 1 for a single view, whose transform is constant."""
         return 1 if self.views == 1 else max(math.ceil(FINER * self.views), TAPS)
 
     @property
     def places(self) -> NDArray[np.int64]:
-        """Whole numbers that stand for the views."""
+        """Integer positions of the views."""
         return np.arange(self.views) - self.views // 2
 
     @property
     def beta(self) -> float:
-        """Of the Kaiser–Bessel kernel (Beatty et al., eq. 5), for the oversampling that there really is."""
+        """β of the Kaiser–Bessel kernel (Beatty et al., eq. 5), for the actual oversampling."""
         finer = self.size / self.views
         return math.pi * math.sqrt((TAPS / finer * (finer - 0.5)) ** 2 - 0.8)
 
@@ -68,7 +69,7 @@ class _ViewAxis:
         return np.where(np.abs(distance) <= TAPS / 2, np.i0(self.beta * np.sqrt(inside)) / TAPS, 0.0)
 
     def weights(self) -> Array:
-        """One over the kernel's transform at the views' places (Beatty et al., eq. 4)."""
+        """The inverse of the kernel's transform at the views' positions (Beatty et al., eq. 4)."""
         if self.views == 1:
             return np.ones(1)
         inside = np.sqrt(self.beta**2 - (np.pi * TAPS * self.places / self.size) ** 2)
@@ -86,22 +87,22 @@ class _ViewAxis:
 
 
 class Refocuser:
-    """Pictures of one light field focused anywhere: one 4-D transform, then a slice for each.
+    """Images of one light field at any focus: one 4-D transform, then a slice per image.
 
-    Pictures are means over the views, upright, pixel by pixel where a view in the middle of all would have them:
-    what an ideal lens as large as the grid of views records, without its loss of sharpness to interpolation.
+    Images are means over the views, upright, aligned with the pixels of a view at the centre of all. An ideal
+    lens as large as the grid of views would record them, except for its blur by interpolation.
 
     Args:
-        light_field: in memory, at the plane from which distances are counted.
-        weights: of the views, shape (rows of views, columns of views), 0 or more: a round or a coded aperture;
-            None weighs all alike.
-        border: pixels added on each side of the pictures, in which one border fades into the opposite one: what a
-            transform takes to lie beyond a border is there, and not at the opposite end of the picture.
-        memory_limit: bytes that the transform may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        light_field: in memory, at the plane from which distances are measured.
+        weights: of the views, shape (rows of views, columns of views), not negative: a round or a coded aperture;
+            None weights all equally.
+        border: pixels added on each side of the images, in which opposite borders blend. A transform assumes
+            periodic images; artefacts of that stay in this border.
+        memory_limit: bytes for the transform; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
-        InputError: a light field on disk, weights of another shape, negative or all zero, a negative border, or
-            more memory needed than allowed.
+        InputError: a light field on disk, weights of a wrong shape, negative or all zero, a negative border,
+            or more memory needed than allowed.
     """
 
     def __init__(
@@ -152,24 +153,25 @@ class Refocuser:
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the transform takes."""
+        """Size of the transform in bytes."""
         return self._spectrum.nbytes
 
     def shift(self, distance: float) -> Array:
-        """How a point at a distance moves from view to view: S, 2×2, pixels (k, l) per view (i, j).
+        """The motion of a point at a distance between views: S, 2×2, pixels (k, l) per view (i, j).
 
-        It is seen at (k, l) = (k₀, l₀) − S·(i − i₀, j − j₀); for an array of cameras S is its disparity times one.
+        The point is at (k, l) = (k₀, l₀) − S·(i − i₀, j − j₀); for an array of cameras, S is its disparity
+        times identity.
 
         Args:
-            distance: metres before the plane of the light field, above 0; may be infinite.
+            distance: metres before the plane of the light field, positive; may be infinite.
 
         Raises:
-            InputError: a distance of zero or less, or one at which the pixels of a view all see one place.
+            InputError: a distance that is not positive, or one at which all pixels of a view show one point.
         """
         counted = "it is counted from the plane of the light field towards the scene"
         checks.above_zero("a distance to focus at", distance, unit="m", infinite=True, way_out=counted)
         linear = self.light_field.frame.linear
-        # Places (u − Z·s, v − Z·t) at the distance, divided by Z, which may be infinite.
+        # Positions (u − Z·s, v − Z·t) at the distance, divided by Z, which may be infinite.
         place = linear[:2] / distance - linear[2:]
         if not Affine.from_parts(place[:, 2:], np.zeros(2)).is_invertible():
             raise InputError(
@@ -179,21 +181,21 @@ class Refocuser:
         return np.asarray(np.linalg.solve(place[:, 2:], place[:, :2]))
 
     def margin(self, distance: float) -> tuple[int, int]:
-        """(rows, columns) of pixels along the picture's borders that need light from beyond the given views."""
+        """(rows, columns) of pixels along the image's borders that need light from outside the given views."""
         nv, nu = self.light_field.shape[:2]
         columns, rows = np.abs(self.shift(distance)) @ [(nu - 1) / 2, (nv - 1) / 2]
         return math.ceil(rows), math.ceil(columns)
 
     def at(self, distance: float) -> Image:
-        """The picture focused at a distance.
+        """The image focused at a distance.
 
         Args:
-            distance: metres before the plane of the light field, above 0; may be infinite.
+            distance: metres before the plane of the light field, positive; may be infinite.
 
         Returns:
-            Mean radiance over the views, float32, shape (t, s[, channels]), upright; placed where its pixels look
-            on the plane 1 m before the light field, as `LightField.view`. Pixels within `margin` of a border mix
-            in what is not known there.
+            Mean radiance over the views, float32, shape (t, s[, channels]), upright; its frame refers to the
+            plane 1 m before the light field, as for `LightField.view`. Pixels within `margin` of a border
+            include unknown light.
 
         Raises:
             InputError: see `shift`.
@@ -213,7 +215,7 @@ class Refocuser:
             base = start + row * self._across.size
             for column, weight in across:
                 found += flat[:, base + column] * (row_weight * weight)
-        # Views are counted from n // 2 in the transform, from the middle of all in the picture.
+        # The transform counts views from n // 2, the image from the centre of all views.
         offset = nu // 2 - (nu - 1) / 2, nv // 2 - (nv - 1) / 2
         if any(offset):
             found *= np.exp(-2j * np.pi * (kappa_i * offset[0] + kappa_j * offset[1])).astype(np.complex64)
@@ -236,9 +238,9 @@ def _shares(weights: ArrayLike | None, shape: tuple[int, ...]) -> Array:
 
 
 def _led_over(values: NDArray[Any], border: int, axis: int) -> NDArray[Any]:
-    """Pictures with a border on both sides along an axis, in which the last row leads over to the first.
+    """Images extended on both sides along an axis by a smooth transition from the last row to the first.
 
-    A transform takes a picture to repeat: a jump from one border to the other would ring through all of it.
+    A transform assumes periodic images: a jump between opposite borders would ring through the whole image.
     """
     if border == 0:
         return values

@@ -1,4 +1,4 @@
-"""Sampling advice: whether views, pixels, masks and light itself carry what a camera asks of them, as numbers."""
+"""Sampling advice: whether views, pixels, masks and wavelength suffice for a camera, as numbers."""
 
 from __future__ import annotations
 
@@ -25,30 +25,30 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMNS = 100
-"""Into which an advice's lines fit."""
+"""Line width of the text."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SamplingAdvice(SamplingLimits, Shown):
-    """Limits of sampling, of paraxial optics and of diffraction, of one camera and one light field.
+    """Limits of sampling, of paraxial optics and of diffraction, for a camera and a light field.
 
-    ``advice["disparity near"].value`` is a number; ``str(advice)`` tells all in words, ``advice.plot()`` draws it.
-    What the other fields hold is said at `vcc.advice.words.SamplingLimits`.
+    ``advice["disparity near"].value`` is a number; ``str(advice)`` returns all as text, ``advice.plot()``
+    draws it. The other fields are documented at `vcc.advice.words.SamplingLimits`.
 
     Args:
-        light_field: in words: the one given, or the one that the camera asks for.
+        light_field: as text: the given light field, or the one that the camera needs.
     """
 
     light_field: str
 
     def disparity(self, distance: float) -> float:
-        """Pixels on the sensor between neighbouring views' pictures of a point, along the worse axis.
+        """Distance in pixels on the sensor between neighbouring views' images of a point, along the worse axis.
 
         Args:
-            distance: of the point before the entrance plane, metres, above 0; may be infinite.
+            distance: of the point before the entrance plane, metres, positive; may be infinite.
 
         Raises:
-            InputError: a distance of 0 or less, or a camera for which this is not given (see ``notes``).
+            InputError: a distance that is not positive, or a camera without this number (see ``notes``).
         """
         checks.above_zero("the distance of a point", distance, unit="m", infinite=True)
         if self.gaps is None:
@@ -56,7 +56,7 @@ class SamplingAdvice(SamplingLimits, Shown):
         return float(self.gaps.at(np.array([1 / distance]))[0])
 
     def plot(self) -> Figure:
-        """Draw disparity and blur over distance, with the range free of ghosts, and bars of all lengths."""
+        """Draw disparity and blur over distance, with the range free of ghosts, and bars for all lengths."""
         return plot_sampling(self)
 
     def __repr__(self) -> str:
@@ -84,27 +84,27 @@ def sampling_advice(
     views: tuple[int, int] | None = None,
     wavelength: float = GREEN_LIGHT,
 ) -> SamplingAdvice:
-    """What a camera asks of a light field, what it gets, and where paraxial ray optics ends.
+    """Compare what a camera needs with what a light field has, and check the limits of paraxial optics.
 
-    With neighbouring views du apart, a point at distance Z has pictures (A + B/Z)·du apart on the sensor, where
-    x = A·u + B·s leads there from the entrance plane: for a lens of focal length f at the views' plane and a
-    sensor d behind it |1 − d/f + d/Z|·du. Beyond a pixel, or a sample's footprint where that is wider, copies
-    show.
+    With neighbouring views du apart, the images of a point at distance Z are (A + B/Z)·du apart on the
+    sensor, where x = A·u + B·s maps the entrance plane to the sensor: for a lens of focal length f at the
+    views' plane and a sensor d behind it |1 − d/f + d/Z|·du. If this exceeds a pixel, or the footprint of a
+    sample if that is wider, separate copies (ghosts) appear.
 
     Args:
-        camera: any; what matrices cannot tell, behind lens arrays or phase plates, is left out and noted.
-        light_field: at the entrance plane, in memory or on disk. None: the advice is for the light field
-            that the camera asks for, one that fills its opening, with samples of a pixel and as many views as
-            ``depths`` need.
-        depths: (near, far) of the scene before the entrance plane, metres, the far one maybe infinite. None takes
-            the range that the light field states or shows.
-        views: (rows, columns) of views instead of the number needed; without a light field only.
-        wavelength: metres, by which diffraction goes.
+        camera: any; numbers that matrices do not give, behind lens arrays or phase plates, are omitted, with
+            a note.
+        light_field: at the entrance plane, in memory or on disk. None: the advice is for the light field that the
+            camera needs, which fills its opening, with samples of a pixel and as many views as ``depths`` need.
+        depths: (near, far) of the scene before the entrance plane, metres, the far one may be infinite. None uses
+            the stored or measured range of the light field.
+        views: (rows, columns) of views instead of the number needed; only without a light field.
+        wavelength: for diffraction, metres.
 
     Raises:
-        InputError: neither a light field nor depths, depths out of order or not above 0, views beside a light
-            field, a wavelength of 0 or less; without a light field: a camera without a stop, or one that bends
-            light otherwise than by lenses and prisms.
+        InputError: neither a light field nor depths, depths that are out of order or not positive, views together
+            with a light field, a wavelength that is not positive; without a light field: a camera without a
+            stop, or with elements other than lenses and prisms that bend light.
     """
     if not isinstance(camera, Train):
         raise InputError(f"sampling advice is for a vcc.Camera, not for a {type(camera).__name__}")

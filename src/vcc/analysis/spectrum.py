@@ -1,16 +1,16 @@
-"""The 4-D Fourier transform of a light field, on physical frequency axes, and what optics does to it.
+"""The 4-D Fourier transform of a light field with physical frequency axes, and the effect of optics on it.
 
 The spectrum is F(f) = ∫ L(r) exp(−2πi f·r) dr over rays r = (u, v, s, t), with f = (fu, fv, fs, ft): cycles per
-metre along u and v, cycles per unit of slope along s and t. Samples stand at r = A·q + b for whole numbers q, so
-that f·r = (Aᵀf)·q + f·b: the discrete transform is F at f = A⁻ᵀ·κ, with κ in cycles per sample. Frequencies go
-with the inverse transpose of the frame, whatever the frame is.
+metre along u and v, cycles per unit of slope along s and t. Samples are at r = A·q + b for integer q, so that
+f·r = (Aᵀf)·q + f·b: the discrete transform is F at f = A⁻ᵀ·κ, with κ in cycles per sample. The frame of the
+frequencies is the inverse transpose of the light field's frame.
 
-Optics in these terms (Ng, "Fourier slice photography", 2005; Veeraraghavan et al., "Dappled photography", 2007):
+The effect of optics (Ng, "Fourier slice photography", 2005; Veeraraghavan et al., "Dappled photography", 2007):
 
-- a linear element or flight, r' = M·r + c, gives F'(f) = F(Mᵀf)·exp(−2πi f·c) for |det M| = 1: a shear;
+- a linear element or free propagation, r' = M·r + c, gives F'(f) = F(Mᵀf)·exp(−2πi f·c) for |det M| = 1: a shear;
 - a mask at the light field's plane convolves F with the mask's spectrum along (fu, fv);
 - a diffuser multiplies F by the spectrum of its kernel, a function of (fs, ft);
-- a sensor takes the slice fs = ft = 0, which is the spectrum of its picture.
+- a sensor measures the slice fs = ft = 0, the spectrum of its image.
 """
 
 from __future__ import annotations
@@ -37,19 +37,19 @@ Window = str | tuple[Any, ...] | None
 AXES = {"v": 0, "u": 1, "t": 2, "s": 3}
 """The axis of the values for each coordinate."""
 ROUNDING = 2e-5
-"""What single precision leaves after eight transforms along axes, as a share of the largest value."""
+"""Relative rounding error of single precision after eight transforms along axes, for the largest value."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spectrum(Shown):
-    """A light field's 4-D spectrum: complex amplitudes, and the frame of the samples that they come from.
+    """A light field's 4-D spectrum: complex amplitudes, and the frame of the transformed samples.
 
     Args:
         values: F at the frequencies of `frame`, shape (v, u, t, s[, channels]), complex64, zero frequency in the
-            middle (index n // 2 of each axis); radiance × m² (slopes have no unit). Their phases are about the
-            ray `origin`.
+            middle (index n // 2 of each axis); radiance × m² (slopes have no unit). Phases are relative to the ray
+            `origin`.
         light_field_frame: the frame of the transformed light field, 5×5.
-        sample: what the transformed samples are, means or points; see `vcc.LightField`.
+        sample: whether the transformed samples are means or points; see `vcc.LightField`.
     """
 
     values: NDArray[np.complex64]
@@ -80,7 +80,7 @@ class Spectrum(Shown):
 
     @property
     def origin(self) -> Array:
-        """The ray (u, v, s, t) about which phases are: that of the middle sample, index n // 2 of each axis."""
+        """The ray (u, v, s, t) to which phases refer: the middle sample, index n // 2 of each axis."""
         return self.light_field_frame(np.array(self.sizes) // 2)
 
     def frequencies(self, coordinate: str) -> Array:
@@ -90,7 +90,7 @@ class Spectrum(Shown):
             coordinate: ``"u"``, ``"v"``, ``"s"`` or ``"t"``.
 
         Returns:
-            Shape (n,), rising or falling with the index as the frame has it.
+            Shape (n,), rising or falling with the index, depending on the frame.
 
         Raises:
             InputError: another coordinate.
@@ -101,9 +101,9 @@ class Spectrum(Shown):
         return self.frame(index)[:, place]
 
     def transformed(self, affine: Affine) -> Spectrum:
-        """The spectrum after a linear element or flight: the frame shears, no value changes.
+        """The spectrum after a linear element or free propagation: the frame shears, the values stay the same.
 
-        The same as ``fft4(light_field.transformed(affine))``. A prism changes nothing but `origin`.
+        Equal to ``fft4(light_field.transformed(affine))``. A prism changes only `origin`.
 
         Args:
             affine: an invertible 5×5 map of rays.
@@ -113,17 +113,17 @@ class Spectrum(Shown):
         return Spectrum(values, affine @ self.light_field_frame, self.sample)
 
     def sensor_slice(self) -> PlaneSpectrum:
-        """The spectrum of ∫∫ L ds dt at this plane, the picture on a sensor there: F(fx, fy, 0, 0).
+        """The spectrum of ∫∫ L ds dt at this plane, that is of the image on a sensor there: F(fx, fy, 0, 0).
 
-        Where the slice runs obliquely through the samples, they are interpolated exactly, as the trigonometric
-        polynomials that they are. Frequencies are as close as the picture is wide, (i, k) along x and (j, l)
-        along y; the slice repeats beyond half a sample's frequency.
+        If the slice is oblique to the samples, they are interpolated exactly, as trigonometric polynomials.
+        The frequency step is 1/width of the image, (i, k) along x and (j, l) along y; the slice is periodic
+        beyond half the sampling frequency.
 
         Returns:
             Complex values, shape (rows, columns[, channels]), irradiance × m².
 
         Raises:
-            InputError: a frame that mixes x and y, or along which a place depends on no index.
+            InputError: a frame that mixes x and y, or along which positions depend on no index.
         """
         linear = self.light_field_frame.linear
         if np.abs(linear[[0, 0, 1, 1], [1, 3, 0, 2]]).max() > 1e-9 * np.abs(linear[:2]).max():
@@ -133,7 +133,7 @@ class Spectrum(Shown):
             )
         values = np.asarray(self.values)
         steps = []
-        # u first: its two axes are 1 and 3 of (v, u, t, s), and what is left of them stands last.
+        # u first: its axes are 1 and 3 of (v, u, t, s); the combined axis becomes the last one.
         for view, pixel, row in ((1, 3, 0), (0, 1, 1)):
             values, step = self._sliced(values, view, pixel, row)
             steps.append(step)
@@ -143,7 +143,7 @@ class Spectrum(Shown):
         return PlaneSpectrum(values, frame, (float(origin[0]), float(origin[1])))
 
     def _sliced(self, values: NDArray[Any], view: int, pixel: int, row: int) -> tuple[NDArray[Any], float]:
-        """The slice along one coordinate of place: the view and pixel axes become one, in the latter's place."""
+        """The slice along one coordinate of position: the view and pixel axes are combined, at the pixel axis."""
         by_view, by_pixel = self.light_field_frame.linear[row, [row, row + 2]]
         n_view, n_pixel = values.shape[view], values.shape[pixel]
         if by_view == 0 and by_pixel == 0:
@@ -158,11 +158,11 @@ class Spectrum(Shown):
         weights = _trigonometric(wanted, others)
         moved = np.moveaxis(values, (view, pixel), (0, 1))
         mixed = np.einsum("ab...,ba->b...", moved, weights.astype(np.complex64))
-        # The view axis stood before the pixel axis and is gone.
+        # The view axis was before the pixel axis and is removed.
         return np.moveaxis(mixed, 0, pixel - 1), float(step)
 
     def power(self, across: tuple[str, str]) -> Array:
-        """|F|² summed over the axes that are not named, and over channels: shape (first, second).
+        """|F|² summed over the other axes and over channels: shape (first, second).
 
         Args:
             across: two of ``"u"``, ``"v"``, ``"s"``, ``"t"``.
@@ -172,7 +172,7 @@ class Spectrum(Shown):
         """
         first, second = _two_axes(across)
         total = np.zeros((self.shape[first], self.shape[second]))
-        for row in range(self.shape[first]):  # by rows, so that no second array of this size is made
+        for row in range(self.shape[first]):  # by rows, to avoid a second array of this size
             part = np.take(self.values, row, axis=first)
             axis = second - (second > first)
             squares = np.abs(part).astype(np.float64) ** 2
@@ -180,7 +180,7 @@ class Spectrum(Shown):
         return total
 
     def section(self, across: tuple[str, str]) -> NDArray[np.complex64]:
-        """F in the plane of two axes through zero frequency of the others: shape (first, second[, channels]).
+        """F in the plane of two axes, at zero frequency of the others: shape (first, second[, channels]).
 
         Args:
             across: two of ``"u"``, ``"v"``, ``"s"``, ``"t"``.
@@ -194,10 +194,10 @@ class Spectrum(Shown):
         return plane if first < second else np.swapaxes(plane, 0, 1)
 
     def replaced(self, values: ArrayLike) -> Spectrum:
-        """The same frequencies with other values, for instance filtered.
+        """The same frequencies with other values, for example filtered ones.
 
         Raises:
-            InputError: another shape.
+            InputError: a wrong shape.
         """
         given = np.asarray(values, dtype=np.complex64)
         if given.shape != self.shape:
@@ -213,18 +213,18 @@ def fft4(
 ) -> Spectrum:
     """The 4-D spectrum of a light field, axis by axis, in single precision.
 
-    It takes 8 bytes for each sample, and little more while it is made. Channels are transformed one by one.
+    It takes 8 bytes per sample, and little more during the computation. Channels are transformed one by one.
 
     Args:
         light_field: in memory, at any plane.
-        window: by which samples are weighted towards the borders, which otherwise show as crosses: the name of
-            one of `scipy.signal.get_window` such as ``"hann"``, or a tuple of a name and numbers, for all four
-            axes; or a list of four, for (v, u, t, s), with None for an axis left as it is.
-        memory_limit: bytes that the spectrum may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        window: weights that fall towards the borders, which otherwise appear as crosses: a name for
+            `scipy.signal.get_window` such as ``"hann"``, or a tuple of a name and numbers, for all four axes; or a
+            list of four, for (v, u, t, s), with None for no window.
+        memory_limit: bytes for the spectrum; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
-        InputError: a light field on disk, an unknown window, or more memory needed than allowed (said before
-            anything is computed).
+        InputError: a light field on disk, an unknown window, or more memory needed than allowed (checked before
+            the computation).
     """
     if not isinstance(light_field, LightField):
         raise InputError(
@@ -235,7 +235,7 @@ def fft4(
     given = to_numpy(light_field.values)
     values = np.empty(given.shape, dtype=np.complex64)
     scale = light_field.sample_volume / light_field.full_scale
-    for row in range(given.shape[0]):  # so that no copy of all samples in another type is made
+    for row in range(given.shape[0]):  # avoids a converted copy of all samples
         part = given[row].astype(np.float32) * np.float32(weights[0][row])
         for axis, weight in enumerate(weights[1:]):
             part *= weight.astype(np.float32).reshape([-1 if n == axis else 1 for n in range(part.ndim)])
@@ -247,18 +247,18 @@ def fft4(
 
 
 def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
-    """The light field of a spectrum: `fft4` undone. A window that it was made with stays in the samples.
+    """The light field of a spectrum: the inverse of `fft4`. The effect of a window stays in the samples.
 
     Args:
-        spectrum: see `fft4`; of a real light field, F(−f) is the conjugate of F(f).
-        memory_limit: bytes that the work may take; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        spectrum: see `fft4`; for a real light field, F(−f) is the conjugate of F(f).
+        memory_limit: bytes for the work; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Returns:
-        Float32 samples on the frame `spectrum.light_field_frame`, means or points as `spectrum.sample` says.
+        Float32 samples in the frame `spectrum.light_field_frame`, means or points according to `spectrum.sample`.
 
     Raises:
-        InputError: samples that are not real or not positive by more than rounding (a filtered spectrum may be
-            that of no radiance: see `samples_of`), or more memory needed than allowed.
+        InputError: samples that are not real or not positive beyond rounding (a filtered spectrum may have such
+            samples: see `samples_of`), or more memory needed than allowed.
     """
     samples = samples_of(spectrum, memory_limit=memory_limit)
     largest = float(np.abs(samples).max(initial=0.0))
@@ -266,21 +266,21 @@ def ifft4(spectrum: Spectrum, *, memory_limit: int | None = None) -> LightField:
     if lowest < -ROUNDING * largest:
         raise InputError(
             f"this spectrum is that of a light field with negative samples (lowest {lowest:g}, largest "
-            f"{largest:g}), which radiance is not: take the numbers from vcc.analysis.samples_of(spectrum), and "
-            "clip or shift them"
+            f"{largest:g}), but radiance is not negative: use the numbers of vcc.analysis.samples_of(spectrum), "
+            "and clip or shift them"
         )
     return LightField(np.maximum(samples, 0), spectrum.light_field_frame, sample=spectrum.sample)
 
 
 def samples_of(spectrum: Spectrum, *, memory_limit: int | None = None) -> NDArray[np.float32]:
-    """The real samples of a spectrum, negative ones included: shape (v, u, t, s[, channels]), float32.
+    """The real samples of a spectrum, including negative ones: shape (v, u, t, s[, channels]), float32.
 
     Args:
         spectrum: see `ifft4`.
-        memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
+        memory_limit: bytes; None uses `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
-        InputError: samples that are not real by more than rounding, or more memory needed than allowed.
+        InputError: samples that are not real beyond rounding, or more memory needed than allowed.
     """
     check_size(spectrum.shape, memory_limit, "undoing the transform")
     values = spectrum.values / np.float32(abs(spectrum.light_field_frame.determinant))
@@ -297,10 +297,10 @@ def samples_of(spectrum: Spectrum, *, memory_limit: int | None = None) -> NDArra
 
 
 def check_size(shape: Sequence[int], limit: int | None, what: str) -> None:
-    """Refuse complex64 values of this shape above a limit of bytes.
+    """Check that complex64 values of this shape fit a limit in bytes.
 
     Raises:
-        InputError: with the size, the limit and what to do.
+        InputError: they do not; with the size, the limit and a remedy.
     """
     piece = "transform a piece (lf[:, :, :256, :256], or lf[..., :1] for one channel)"
     check_samples(shape, limit, what, piece, each=8)
@@ -335,15 +335,15 @@ def _windows(window: Window | Sequence[Window], shape: tuple[int, ...]) -> list[
             found.append(np.ones(size))
             continue
         try:
-            # Symmetric: samples stand symmetrically in their grid.
+            # Symmetric, as the samples are symmetric in their grid.
             found.append(np.asarray(get_window(name, size, fftbins=False), dtype=np.float64))
         except (ValueError, TypeError) as error:
-            raise InputError(f"window {name!r} is none of scipy.signal.get_window: {error}") from None
+            raise InputError(f"window {name!r} is unknown to scipy.signal.get_window: {error}") from None
     return found
 
 
 def _trigonometric(wanted: Array, count: int) -> NDArray[np.complex128]:
-    """Weights (wanted, count) by which a transform's values give it between its frequencies.
+    """Weights (wanted, count) that interpolate a transform between its frequencies.
 
     V(κ) = Σ_x l_x exp(−2πiκx) with l_x = 1/n · Σ_m V_m exp(2πi m x/n), x and m from −(n // 2) on.
     """

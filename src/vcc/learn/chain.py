@@ -226,9 +226,9 @@ class Chain:
             if found.array().size > MOST_BY_DIFFERENCES and not made.linear(name):
                 raise InputError(
                     f"no number of this plan is linear in {name} ({found.owned_by}), which has "
-                    f"{found.array().size} numbers; what is not is learned by differences, up to "
-                    f"{MOST_BY_DIFFERENCES} numbers. Give it fewer; a plate that bends nothing yet, begin with "
-                    "one that does"
+                    f"{found.array().size} numbers; other parameters are learned by differences, with up to "
+                    f"{MOST_BY_DIFFERENCES} numbers. Use fewer numbers; for a plate without any deflection, start "
+                    "from one that deflects light"
                 )
 
     def _check_edges(self, values: Values) -> None:
@@ -242,9 +242,9 @@ class Chain:
             if cut:
                 owner = parameter(self.train, name).owned_by
                 raise InputError(
-                    f"there is no derivative to {name} ({owner}): it moves rays against {', '.join(cut)}, a hard "
-                    "edge inside the path of rays that each ray passes or not. Keep it as it is, or put a pattern "
-                    "that falls off smoothly in the edge's place"
+                    f"there is no derivative to {name} ({owner}): it moves rays across {', '.join(cut)}, a hard "
+                    "edge that each ray either passes or not. Do not learn it, or replace the edge by a pattern "
+                    "that falls off smoothly"
                 )
 
 

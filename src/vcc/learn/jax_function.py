@@ -61,7 +61,6 @@ class CameraFunction:
             not affect images, are learned with PyTorch.
         how: as in `vcc.Camera.capture`. The engine is ``"numba"``, or ``"reference"``, whose images are float64
             if JAX supports it.
-            where JAX has it.
         options: as in `vcc.Camera.capture`.
 
     Raises:
@@ -82,7 +81,7 @@ class CameraFunction:
         for name in names:
             if name.startswith(ELECTRONICS):
                 raise InputError(
-                    f"{name} is learned of what is recorded, and this makes pictures on the sensor: learn it with "
+                    f"{name} affects recordings, but not the images of this function: learn it with "
                     "PyTorch, vcc.torch.CameraModule(…).expose"
                 )
         self._work = Work.of(camera, light_field, by_an_engine(How.of(how, options)), names)
@@ -232,16 +231,16 @@ class CameraFunction:
         for name, value in given.items():
             if isinstance(value, jax.core.Tracer):
                 raise InputError(
-                    f"values for {name} are traced by JAX, and a camera is made of known numbers: ask for "
-                    "it outside jax.jit, jax.grad and jax.vmap"
+                    f"values for {name} are traced by JAX, but a camera needs concrete numbers: call this "
+                    "outside jax.jit, jax.grad and jax.vmap"
                 )
         return self._parted(given)[1]
 
 
 def _refuse_second(kept: Any, weights: Any) -> Any:
     raise InputError(
-        "pictures have first derivatives only: a derivative of their gradient (jax.grad of jax.grad, a penalty on "
-        "a gradient) is not to be had"
+        "images have first derivatives only: derivatives of their gradient (jax.grad of jax.grad, a penalty on "
+        "a gradient) are not supported"
     )
 
 
@@ -252,16 +251,16 @@ def _as_values(values: Any, shapes: Mapping[str, tuple[int, ...]]) -> Given:
     """Values of all parameters by name, as JAX arrays."""
     if not isinstance(values, Mapping):
         raise InputError(
-            f"values are a dict of arrays by the names of parameters, function.values, not {type(values).__name__}"
+            f"values must be a dict of arrays by parameter name (function.values), not {type(values).__name__}"
         )
     for name in values:
         if name not in shapes:
             raise InputError(
-                f"values have {name}, which is not learned here: there are {', '.join(shapes) or 'none'}"
+                f"values have {name}, which is not learned; learned are {', '.join(shapes) or 'none'}"
             )
     for name in shapes:
         if name not in values:
-            raise InputError(f"values have no {name}: give all that is learned, {{**function.values, …}}")
+            raise InputError(f"values have no {name}: pass all learned parameters, {{**function.values, …}}")
     return {name: _as_array(f"values for {name}", values[name]) for name in shapes}
 
 
@@ -270,9 +269,9 @@ def _as_array(what: str, value: Any) -> Any:
     try:
         array = jnp.asarray(value)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{what} are an array of floating point, not {type(value).__name__}") from error
+        raise InputError(f"{what} must be a floating-point array, not {type(value).__name__}") from error
     if not jnp.issubdtype(array.dtype, jnp.floating):
-        raise InputError(f"{what} are floating point, not {array.dtype}")
+        raise InputError(f"{what} must be floating point, not {array.dtype}")
     return array
 
 
@@ -282,10 +281,10 @@ def _as_samples(samples: Any) -> Any:
         array = jnp.asarray(samples)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"samples are an array, not {type(samples).__name__}: jax.numpy.asarray(light_field.values) makes one"
+            f"samples must be an array, not {type(samples).__name__}: pass jax.numpy.asarray(light_field.values)"
         ) from error
     if str(array.dtype) not in KINDS:
         raise InputError(
-            f"samples are {', '.join(KINDS)}, not {array.dtype}: convert them, samples.astype(jax.numpy.float32)"
+            f"samples must be {', '.join(KINDS)}, not {array.dtype}: pass samples.astype(jax.numpy.float32)"
         )
     return array

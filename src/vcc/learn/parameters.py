@@ -326,18 +326,18 @@ def _checked(found: Parameter, value: Any) -> Any:
     now = found.array()
     numbers = np.asarray(value, dtype=np.float64)
     if numbers.shape != now.shape:
-        raise InputError(f"{found.name} has the shape {now.shape}, and numbers of shape {numbers.shape} are given")
+        raise InputError(f"{found.name} has the shape {now.shape}, but the values have the shape {numbers.shape}")
     good = np.isfinite(numbers)
     if not good.all():
         place = "" if numbers.ndim == 0 else f" at index {tuple(int(n) for n in np.argwhere(~good)[0])}"
         raise InputError(
-            f"{found.name} ({found.field} of {found.owned_by}) is {numbers[~good][0]}{place}: the step that "
-            "led here was too long, or a loss was not finite. Take a smaller learning rate, or look at the loss"
+            f"{found.name} ({found.field} of {found.owned_by}) is {numbers[~good][0]}{place}: the last step "
+            "was too long, or a loss was not finite. Use a smaller learning rate, or check the loss"
         )
     if _is_transmission(found) and not (numbers.min() >= 0 and numbers.max() <= 1):
         raise InputError(
             f"{found.name} ({found.field} of {found.owned_by}) goes from {numbers.min():.6g} to "
-            f"{numbers.max():.6g}, and transmission lies between 0 and 1. Learn free numbers below a constraint "
+            f"{numbers.max():.6g}, but transmission is between 0 and 1. Learn free numbers with a constraint "
             "(sigmoid_mask of vcc.torch, jax.nn.sigmoid), or clamp it to 0 and 1 after each step"
         )
     if isinstance(found.value, np.ndarray):

@@ -63,8 +63,8 @@ class Work:
         whole = light_field.whole()
         if whole is not None and not isinstance(whole, np.ndarray):
             raise InputError(
-                f"the light field is a {type(whole).__module__}.{type(whole).__name__}, and has to be a NumPy "
-                "array here: pass light_field.replaced(numpy.asarray(values)), and these values as samples"
+                f"the light field is a {type(whole).__module__}.{type(whole).__name__}, but must be a NumPy "
+                "array: pass light_field.replaced(numpy.asarray(values)), and these values as samples"
             )
         chain = Chain(camera, light_field.grid, how, names)
         Drive.of_linear(chain.plan(), light_field, how)
@@ -116,9 +116,9 @@ def listed(learn: Any) -> tuple[str, ...]:
     names = tuple(learn)
     for name in names:
         if not isinstance(name, str):
-            raise InputError(f"learn is a list of names of parameters, not of {type(name).__name__}")
+            raise InputError(f"learn must be a list of parameter names, but contains a {type(name).__name__}")
         if names.count(name) > 1:
-            raise InputError(f"{name} is listed {names.count(name)} times in learn: once will do")
+            raise InputError(f"{name} is listed {names.count(name)} times in learn: list it once")
     return names
 
 
@@ -136,13 +136,13 @@ def several_of(given: Mapping[str, tuple[int, ...]], own: Mapping[str, tuple[int
         lead = len(shape) - len(own[name])
         if lead not in (0, 1) or shape[lead:] != own[name] or shape[:lead] == (0,):
             raise InputError(
-                f"values for {name} have the shape {own[name]}, or that with an axis of pictures in front, "
+                f"values for {name} must have the shape {own[name]}, or one more leading axis for several images, "
                 f"not {shape}"
             )
     several = {name for name, shape in given.items() if len(shape) > len(own[name])}
     counts = {given[name][0] for name in several}
     if len(counts) > 1:
-        raise InputError(f"values for {', '.join(sorted(several))} have different numbers of pictures: {counts}")
+        raise InputError(f"values for {', '.join(sorted(several))} have different numbers of images: {counts}")
     return several
 
 
@@ -154,11 +154,11 @@ def check_samples(shape: tuple[int, ...], grid: Grid) -> None:
     """
     if shape[-len(grid.shape) :] != grid.shape:
         raise InputError(
-            f"samples have the shape {shape}, and the light field has {grid.shape}, with any number of axes in "
-            "front for several of them"
+            f"samples have the shape {shape}, but the light field has {grid.shape}; samples of several light "
+            "fields have leading axes"
         )
     if 0 in shape:
-        raise InputError(f"samples of shape {shape} are none")
+        raise InputError(f"samples of shape {shape} are empty")
 
 
 def by_an_engine(how: How) -> How:
@@ -284,7 +284,7 @@ class Call:
             values = ahead[0][0].given.whole()
             if values is not None:
                 checks.all_finite("samples", np.asarray(values))
-        raise InputError("the picture has values that are not finite: samples or parameters are too large")
+        raise InputError("the image has values that are not finite: samples or parameters are too large")
 
     def back(
         self, weights: NDArray[np.floating], samples: bool, wanted: Collection[str], numbers: Mapping[str, Any]

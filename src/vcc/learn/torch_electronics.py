@@ -120,8 +120,8 @@ def _warn_of_saturation(
             short(float(each), "time", 3) for each in (seconds.detach(), seconds * AUTO_LEVEL * full / mean.max())
         )
         warn_of_result(
-            f"{share:.1%} of what is recorded in {time} is saturated, and its gradients are 0: nothing is learned "
-            f"from it. {shorter} saturates nothing"
+            f"{share:.1%} of the values recorded in {time} are saturated and have gradients of 0. "
+            f"An exposure of {shorter} saturates no pixel"
         )
 
 
@@ -175,7 +175,7 @@ def _filtered(picture: torch.Tensor, sensor: Sensor, electronics: Electronics) -
 def _check_picture(picture: Any, sensor: Sensor) -> None:
     if not isinstance(picture, torch.Tensor) or not picture.is_floating_point():
         kind = picture.dtype if isinstance(picture, torch.Tensor) else type(picture).__name__
-        raise InputError(f"picture is a tensor of floating point, as CameraModule gives it, not {kind}")
+        raise InputError(f"picture must be a floating-point tensor, as CameraModule returns it, not {kind}")
     if sensor.shape not in (tuple(picture.shape[-2:]), tuple(picture.shape[-3:-1])):
         raise InputError(
             f"the sensor has {sensor.shape} pixels (rows, columns), and the picture the shape "

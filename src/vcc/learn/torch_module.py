@@ -35,7 +35,7 @@ from vcc.plan.how import How
 Constraint = Callable[[torch.Tensor], torch.Tensor]
 
 _NUMBERS_ALONE = (
-    'To take its numbers alone: state.pop("_extra_state"), model.load_state_dict(state, strict=False), '
+    'To load its numbers only: state.pop("_extra_state"), model.load_state_dict(state, strict=False), '
     "model.replan()"
 )
 AREA = ("pitch", "fill_factor")
@@ -74,7 +74,7 @@ class _Learned:
             tensor = constraint(tensor)
         if not isinstance(tensor, torch.Tensor) or tuple(tensor.shape) != self.shape:
             given = tuple(tensor.shape) if isinstance(tensor, torch.Tensor) else type(tensor).__name__
-            raise InputError(f"constraints of {self.name} give {given}, and it has the shape {self.shape}")
+            raise InputError(f"constraints of {self.name} return {given}, but it has the shape {self.shape}")
         return tensor
 
 
@@ -120,7 +120,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         for name in constraints or {}:
             if name not in names:
                 raise InputError(
-                    f"{name} has constraints and is not learned: add it to learn=[…], or leave them out"
+                    f"{name} has constraints but is not learned: add it to learn=[…], or leave the constraints out"
                 )
         chosen = by_an_engine(How.of(how, options))
         in_pictures = tuple(name for name in names if not name.startswith(ELECTRONICS))
@@ -146,8 +146,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             if place not in holder._modules:
                 if not place or hasattr(holder, place):
                     raise InputError(
-                        f"{learned.name}: a torch.nn.Module has something else of the name {place!r}: call the "
-                        "element otherwise"
+                        f"{learned.name}: a torch.nn.Module has another attribute {place!r}: rename the element"
                     )
                 holder.add_module(place, torch.nn.Module())
             holder = holder._modules[place]
@@ -198,8 +197,8 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             thing = getattr(thing, place)
         if thing.device.type != "cpu":
             raise InputError(
-                f"{learned.name} is on {thing.device}, and what learns is computed on the CPU: keep the module in "
-                "its memory, model.cpu(), and move pictures, model().to(device)"
+                f"{learned.name} is on {thing.device}, but learning runs on the CPU: keep the module there "
+                "with model.cpu(), and move the images, model().to(device)"
             )
         return thing
 
@@ -209,7 +208,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         for name in given:
             if name not in self._learned:
                 raise InputError(
-                    f"values has {name}, which is not learned here: there are {', '.join(self._learned) or 'none'}"
+                    f"values has {name}, which is not learned; learned are {', '.join(self._learned) or 'none'}"
                 )
         numbers = {}
         for name, learned in self._learned.items():
@@ -320,8 +319,8 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
             scale = state["scales"].get(name, learned.scale)
             if not np.isclose(scale, learned.scale, rtol=1e-9, atol=0):
                 raise InputError(
-                    f"{name} is kept in multiples of {learned.scale:.6g}, and in this state of {scale:.6g}: "
-                    "make the module of the camera with which that learning began, or go on from model.camera()"
+                    f"{name} is stored in multiples of {learned.scale:.6g}, but in this state of {scale:.6g}: "
+                    "make the module from the same initial camera, or continue from model.camera()"
                 )
         work = self._work
         then = {name: _array(state["planned"][name]) for name in self._learned if name in state["planned"]}
@@ -330,13 +329,13 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         other = [what for what, told in ours.items() if told and theirs[what] and told != theirs[what]]
         if other:
             raise InputError(
-                f"this state was planned for another {', another '.join(other)}, and the same plan cannot be made "
-                f"here: make the module as that one was made. {_NUMBERS_ALONE}"
+                f"this state was planned for another {', another '.join(other)}, so that the same plan cannot be "
+                f"made: make the module with the same arguments. {_NUMBERS_ALONE}"
             )
         if state["version"] != VERSION:
             warn_of_result(
-                f"this state was planned by version {state['version']}, and this is {VERSION}: pictures may "
-                "differ. model.replan() decides anew, by what was learned"
+                f"this state was planned by version {state['version']}, and this is {VERSION}: images may "
+                "differ. model.replan() plans again for the learned parameters"
             )
         if (there.camera, there.how) != (work.camera, work.how):
             self._work = Work.of(there.camera, work.light_field, there.how, work.chain.names)
@@ -362,7 +361,9 @@ def _several(name: str, constraints: Any) -> tuple[Constraint, ...]:
     listed = tuple(constraints) if isinstance(constraints, tuple | list) else (constraints,)
     for constraint in listed:
         if not callable(constraint):
-            raise InputError(f"constraints of {name} are functions of tensors, not {type(constraint).__name__}")
+            raise InputError(
+                f"constraints of {name} must be functions of tensors, not {type(constraint).__name__}"
+            )
     return listed
 
 
@@ -375,7 +376,7 @@ def _as_numbers(value: Any, learned: _Learned) -> torch.Tensor:
     """A value for a parameter, for one image or several, checked."""
     if not isinstance(value, torch.Tensor) or not value.is_floating_point():
         kind = value.dtype if isinstance(value, torch.Tensor) else type(value).__name__
-        raise InputError(f"values for {learned.name} are a tensor of floating point, not {kind}")
+        raise InputError(f"values for {learned.name} must be a floating-point tensor, not {kind}")
     _check_device(f"values for {learned.name}", value)
     several_of({learned.name: tuple(value.shape)}, {learned.name: learned.shape})
     return value
@@ -385,13 +386,13 @@ def _as_samples(samples: Any, grid: Grid) -> torch.Tensor:
     """Samples in the light field's shape, with any leading axes, checked."""
     if not isinstance(samples, torch.Tensor):
         raise InputError(
-            f"samples are a tensor, not {type(samples).__name__}: torch.as_tensor(light_field.values) makes one"
+            f"samples must be a tensor, not {type(samples).__name__}: pass torch.as_tensor(light_field.values)"
         )
     _check_device("samples", samples)
     if samples.dtype not in KINDS:
         raise InputError(
-            f"samples are {', '.join(str(kind).removeprefix('torch.') for kind in KINDS)}, not {samples.dtype}: "
-            "convert them, samples.float()"
+            f"samples must be {', '.join(str(kind).removeprefix('torch.') for kind in KINDS)}, not "
+            f"{samples.dtype}: pass samples.float()"
         )
     check_samples(tuple(samples.shape), grid)
     return samples
@@ -403,9 +404,7 @@ KINDS = (torch.float32, torch.float64, torch.float16, torch.uint8, torch.uint16)
 
 def _check_device(what: str, tensor: torch.Tensor) -> None:
     if tensor.device.type != "cpu":
-        raise InputError(
-            f"{what} are on {tensor.device}, and what learns is computed on the CPU: pass tensor.cpu()"
-        )
+        raise InputError(f"{what} are on {tensor.device}, but learning runs on the CPU: pass tensor.cpu()")
 
 
 def _array(tensor: torch.Tensor) -> NDArray[np.float64]:

@@ -76,8 +76,8 @@ class _Back(torch.autograd.Function):  # type: ignore[misc]
     @staticmethod
     def backward(ctx: Any, *weights: torch.Tensor) -> tuple[Any, ...]:
         raise InputError(
-            "pictures have first derivatives only: a derivative of their gradient (create_graph=True, a Hessian, "
-            "a penalty on a gradient) is not to be had"
+            "images have first derivatives only: derivatives of their gradient (create_graph=True, a Hessian, "
+            "a penalty on a gradient) are not supported"
         )
 
 

@@ -97,8 +97,7 @@ class Sensor(Shown):
 
     @property
     def pixel_kinds(self) -> tuple[tuple[Pattern | None, ...], ...]:
-        """The angular responses of the tile that repeats over the sensor, rows of columns; one of all pixels "
-        "alike."""
+        """The tile of angular responses, rows of columns; a single one if all pixels are alike."""
         response = self.angular_response
         if isinstance(response, tuple):
             return response

@@ -74,8 +74,7 @@ class Term(Value):
 
     @classmethod
     def behind(cls, pattern: Pattern | Callable[[Array, Array], ArrayLike], distance: float) -> Term:
-        """A pattern at which rays arrive ``distance`` metres behind the element: (x + distance·s, y + "
-        "distance·t)."""
+        """A pattern ``distance`` metres behind the element: of (x + distance·s, y + distance·t)."""
         return cls(pattern, ((1, 0, distance, 0), (0, 1, 0, distance)))
 
     def share(self, rays: Array) -> Array:
@@ -86,8 +85,7 @@ class Term(Value):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """The largest slopes (s, t) that light through the element's middle can have to pass; infinite if "
-        "unbounded."""
+        """The largest slopes (s, t) that pass at the element's middle; infinite if unbounded."""
         by_slope = np.asarray(self.of)[:, 2:4]
         half = np.array(self.pattern.size) / 2  # type: ignore[union-attr]
         bounds = np.full((2, 2), np.inf)
@@ -98,8 +96,7 @@ class Term(Value):
     @property
     @cached
     def to_plane(self) -> Affine:
-        """The map of rays, about the element's middle, to a plane whose places (x, y) are the pattern's "
-        "numbers."""
+        """The map of rays, about the element's middle, to the plane in which the pattern is a mask."""
         matrix = np.asarray(self.of)
         pairs = list(itertools.combinations(range(4), 2))
         size = np.abs(matrix[:, :4]).max(axis=1, keepdims=True)

@@ -1,7 +1,7 @@
-"""Pictures that explain: a camera from the side, and light fields in phase space.
+"""Drawings: a camera from the side, and light fields in phase space.
 
-All functions draw on Matplotlib axes, given or new, and return them; `savefig` of their ``figure``
-writes a file. New figures belong to nobody but the caller: pyplot and its global state are not used.
+All functions draw on Matplotlib axes, given or new, and return them; `savefig` of their ``figure`` writes a file.
+Outside notebooks, new figures do not use pyplot and its global state unless pyplot is already imported.
 """
 
 from vcc.plot.camera_plot import plot_camera

@@ -1,4 +1,4 @@
-"""A camera from the side: elements in their places, and fans of rays through them."""
+"""Draw a camera from the side: elements at their positions, and fans of rays."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CELLS_MAGNIFIED = 5
-"""Of an array, in the magnified piece beside the drawing."""
+"""Number of cells of an array in the magnified inset."""
 RAYS_A_CELL = 5
-"""There, about so many of a fan go through each cell."""
+"""Approximate number of rays per cell in the inset."""
 
 
 def plot_camera(
@@ -52,43 +52,42 @@ def plot_camera(
     magnified: Axes | bool | None = None,
     axes: Axes | None = None,
 ) -> Axes:
-    """Draw a camera from the side: light goes to the right, the scene is at the left.
+    """Draw a camera from the side: light travels to the right, the scene is on the left.
 
-    Elements stand in their true places with their true heights; their thickness is a symbol, and glass that bends
-    rays otherwise than a lens or a prism has the profile that does so. Rays bend as in the camera, and one that a
-    mask or a rim stops ends there in a dot. Where a diffuser scatters, each ray goes on as three, fainter ones, at
-    the 1/6, 1/2 and 5/6 quantiles of the kernel, each with a third of the light. Heights are magnified against z
-    as the axes show. Of the scene's side only a piece is drawn: rays enter with their true slopes.
+    Elements have their true positions and heights; their thickness is symbolic, and glass that bends rays in
+    other ways than a lens or a prism has the corresponding profile. Rays bend as in the camera; a ray that a
+    mask or a rim stops ends in a dot. At a diffuser, each ray splits into three fainter ones, at the 1/6, 1/2
+    and 5/6 quantiles of the kernel, each with a third of the light. Heights are magnified relative to z, as
+    the axes show. Only a part of the scene's side is drawn: rays enter with their true slopes.
 
-    An array of very many cells is drawn with fewer, larger ones (its label says so), while rays bend as the true
-    cells do; some true cells, the sensor's pixels and their rays are shown magnified beside the drawing.
+    An array of very many cells is drawn with fewer, larger ones (its label reports this), while rays bend as
+    in the true cells. A magnified inset shows some true cells, the sensor's pixels and their rays.
 
     Args:
         camera: what to draw.
-        light_field: whose width on the entrance plane the rays fill; without it they fill the
-            first lens that has a rim, or else the first element that has one.
-        object_distances: of points on the axis, metres before the entrance plane (infinity for
-            parallel light), one colour for each. None draws the distance in focus, also off the
-            axis, and a nearer one.
+        light_field: the rays fill its width on the entrance plane; without it they fill the first lens that has a
+            rim, or else the first element that has one.
+        object_distances: of points on the axis, metres before the entrance plane (infinity for parallel
+            light), one colour each. None draws the distance in focus, on and off the axis, and a nearer one.
         across: ``"x"`` or ``"y"``, the axis drawn upwards in the figure (y points down).
-        rays: how many from each point; None takes 9, and 5 where diffusers split them.
-        magnified: whether to draw a magnified piece of an array of cells beside a new figure's drawing, or the
-            axes in which to draw it; None does so on a new figure, for arrays whose cells are too small to see.
+        rays: number per point; None uses 9, or 5 if diffusers split them.
+        magnified: whether to draw a magnified inset of an array of cells next to a new figure's drawing, or
+            the axes for it; None draws it on a new figure for arrays with cells too small to see.
         axes: where to draw; None makes a new figure.
 
     Returns:
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: another axis, fewer than 2 rays, an object distance of 0 or less, a magnified piece of a
-            camera without an array before its sensor or without axes for it beside given ones, or an element that
-            returns what it must not.
+        InputError: an invalid axis, fewer than 2 rays, an object distance that is not positive, an inset for
+            a camera without an array before its sensor, or without axes for it when ``axes`` are given; or an
+            element with an invalid result.
     """
     checks.one_of("across", across, "xy")
     if rays is not None:
         checks.whole_number_between("rays", rays, 2)
     if magnified is True and axes is not None:
-        raise InputError("beside axes that are given, a magnified piece needs axes too: pass them as magnified=")
+        raise InputError("with axes=, a magnified inset needs axes as well: pass them as magnified=")
     from matplotlib.lines import Line2D
 
     axis = "xy".index(across)
@@ -139,12 +138,12 @@ def plot_camera(
 
 
 def _colour(number: int) -> str:
-    """Of the rays from a point, by its number."""
+    """The colour of the rays from a point, by its number."""
     return (style.BLUE, style.ORANGE, style.GREEN)[number % 3]
 
 
 def set_limits(axes: Axes, start: float, end: float, half: float, across: str) -> None:
-    """Axes from so far before the camera to its end, metres, with a margin."""
+    """Set the axes from ``start`` to the camera's end, metres, with a margin."""
     length = end - start
     axes.set_xlim((start - 0.02 * length) / mm, (end + 0.06 * length) / mm)
     up = -1 if across == "y" else 1  # y points down
@@ -152,12 +151,12 @@ def set_limits(axes: Axes, start: float, end: float, half: float, across: str) -
 
 
 def draw_optical_axis(axes: Axes) -> None:
-    """The line on which elements stand."""
+    """The optical axis."""
     axes.axhline(0, color=style.QUIET, linewidth=0.8, linestyle=(0, (8, 3, 1, 3)), zorder=0)
 
 
 def draw_paths(axes: Axes, distance: float, paths: Paths, axis: int, colour: str, width: float = 1.1) -> None:
-    """Each ray piece by piece, fainter where it lost light; a dot where one is stopped."""
+    """Each ray in pieces, fainter where it lost light; a dot where it is stopped."""
     z, heights = paths.z / mm, paths.positions[..., axis] / mm
     for height, shares, first in zip(heights, paths.shares, paths.starts, strict=True):
         for piece in range(first, len(z) - 1):
@@ -179,11 +178,11 @@ def draw_paths(axes: Axes, distance: float, paths: Paths, axis: int, colour: str
         axes.plot(z[0], heights[:, 0].mean(), "o", color=colour, markersize=5)
 
 
-# --- a magnified piece of an array ---
+# --- magnified inset of an array ---
 
 
 def _array_to_magnify(camera: Train, axis: int, half: float, required: bool) -> Stage | None:
-    """The last array of cells before the sensor; None where it has none, or (unless needed) none that is small."""
+    """The last array of cells before the sensor; unless required, only one with small cells; None if none."""
     arrays = [
         stage
         for stage in camera.stages
@@ -206,7 +205,7 @@ def _draw_magnified(
     light_field: InMemory | None,
     axis: int,
 ) -> None:
-    """Some cells in the middle of an array, with what is behind them up to the sensor."""
+    """Some cells in the middle of an array, with all that is behind them up to the sensor."""
     cells = stage.faces.bending
     assert isinstance(cells, CellDeflection)
     pitch = cells.lattice.pitch
@@ -220,7 +219,7 @@ def _draw_magnified(
     draw_optical_axis(inset)
     to_array = camera.rays_at(stage.z)
     for place, point in enumerate(points):
-        # Off the axis so far that its light goes through the next cell.
+        # Off the axis by so much that the light goes through the next cell.
         aside = to_array.matrix[axis, axis + 2]
         if point.offset and aside:
             point = replace(point, offset=-pitch / float(aside))
@@ -250,7 +249,7 @@ def _draw_magnified(
 
 
 def _join(axes: Axes, piece: tuple[float, float, float], inset: Axes) -> None:
-    """Lines from a piece of the drawing, (z, low, high) in metres, to the axes in which it is magnified."""
+    """Lines from a part of the drawing, (z, low, high) in metres, to the axes that magnify it."""
     from matplotlib.patches import ConnectionPatch
 
     z, low, high = piece

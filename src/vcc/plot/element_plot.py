@@ -1,4 +1,4 @@
-"""One element from the side, and what it does to parallel light."""
+"""Draw one element from the side, with parallel light through it."""
 
 from __future__ import annotations
 
@@ -24,24 +24,23 @@ if TYPE_CHECKING:
 UNBOUNDED_SLOPE = 0.3
 """Slope up to which light is drawn that meets an element which filters directions without a bound."""
 UNBOUNDED = 10 * mm
-"""Half the height of what is drawn of an element without a rim."""
+"""Half the drawn height of an element without a rim, metres."""
 CELLS = 5
-"""Of an array, so many are drawn, and of its light what goes through them."""
+"""Number of cells of an array that are drawn; only light through these is drawn."""
 RAYS, RAYS_THAT_SPLIT, RAYS_A_CELL = 9, 5, 5
 ROOM_BEHIND = (1.5, 60.0)
-"""Bounds of how far rays are followed behind the element, in half heights of what is drawn."""
+"""Bounds for the length of the rays behind the element, in half heights of the drawing."""
 
 
 def plot_element(element: Element, *, across: str = "x", axes: Axes | None = None) -> Axes:
-    """Draw an element from the side, and parallel light that goes through it to the right.
+    """Draw an element from the side, with parallel light through it to the right.
 
+    Of an element without a rim, a part 20 mm high is drawn, of an array the five central cells. Rays continue
+    about as far as the element needs to focus or separate them; z starts at the element.
     Elements that filter directions are drawn with light of three directions.
 
-    Of an element without a rim a piece 20 mm high is drawn, of an array of cells the five in its middle. Rays are
-    followed for about as far as the element brings them to a point or apart; z counts from the element.
-
     Args:
-        element: what to draw, wherever it stands.
+        element: what to draw; its position is ignored.
         across: ``"x"`` or ``"y"``, the axis drawn upwards in the figure (y points down).
         axes: where to draw; None makes a new figure.
 
@@ -49,7 +48,7 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: another axis, or an element that returns what it must not.
+        InputError: an invalid axis, or an element with an invalid result.
     """
     checks.one_of("across", across, "xy")
     axis = "xy".index(across)
@@ -78,7 +77,7 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
 
 
 def _part(element: Element, axis: int) -> tuple[float, int]:
-    """Half the height of what is drawn, metres, and how many rays."""
+    """Half the drawn height, metres, and the number of rays."""
     half = half_size(element, axis)
     if isinstance(element, Louvre):
         return 2.4 * element.pitch, 4 * RAYS_A_CELL
@@ -91,8 +90,7 @@ def _part(element: Element, axis: int) -> tuple[float, int]:
 
 
 def _slopes(element: Element, axis: int) -> tuple[float, ...]:
-    """Slopes of the light that is drawn: 0, and of an element that filters directions, two that pass less or "
-    "not."""
+    """Slopes of the drawn light: 0, and two more for an element that filters directions."""
     terms = [term for part in element.parts() if isinstance(part, Faces) for term in part.terms]
     if not terms:
         return (0.0,)
@@ -102,7 +100,7 @@ def _slopes(element: Element, axis: int) -> tuple[float, ...]:
 
 
 def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Paths:
-    """Rays through the element and on, for as far as their change of slope takes to show."""
+    """Rays through the element and behind it, until their change of slope is visible."""
 
     def through(room: float) -> Paths:
         sensor = Sensor(z=element.length + room, shape=(1, 1), pitch=1.0)
@@ -111,7 +109,7 @@ def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Pat
     one = through(half)
     slopes = np.diff(one.positions[..., axis][:, -2:], axis=1)[:, 0] / half
     steepest = float(np.abs(slopes[one.shares[:, -1] > 0]).max(initial=0.0))
-    height = half / CELLS if len(bundle) == RAYS_A_CELL * CELLS else half  # cells are brought to points one by one
+    height = half / CELLS if len(bundle) == RAYS_A_CELL * CELLS else half  # each cell has its own focus
     wanted = 1.3 * height / steepest if steepest > 0 else 2 * half
     nearest, farthest = (bound * height for bound in ROOM_BEHIND)
     return through(min(max(wanted, nearest), farthest))

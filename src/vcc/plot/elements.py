@@ -1,7 +1,7 @@
-"""What each optical element looks like from the side: the shape of its glass, what it stops, how it scatters.
+"""Draw optical elements from the side: their glass, their stops, their scattering.
 
-An element is drawn by what its faces do, so that a user's own needs no code here: glass has the profile whose
-slopes bend rays as the element does, a scatterer is frosted, and what lets no light through is black.
+An element is drawn from its faces, so that user-defined elements need no code here: glass has the profile whose
+slopes bend rays as the element does, diffusers are frosted, and opaque parts are black.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOST_CELLS = 60
-"""Of an array with more cells than this in the height of the drawing, fewer and larger ones are drawn."""
+"""An array with more cells than this in the height of the drawing is drawn with fewer, larger ones."""
 CELLS_INSTEAD = 40
-"""About so many."""
+"""Approximate number of these cells."""
 POINTS = 801
+"""Number of points at which a glass profile is evaluated."""
 MOST_WALLS = 60
-"""Walls of a louvre that are drawn; more are a dotted sheet."""
-"""At which the profile of a piece of glass is looked at."""
+"""Walls of a louvre that are drawn; with more, a dotted sheet is drawn."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """What of a camera's height is drawn.
+    """The drawn range of heights.
 
     Args:
         axis: 0 draws x upwards, 1 draws y.
@@ -70,10 +70,10 @@ class Pen(Span):
     """Where and how large to draw.
 
     Args:
-        axis: see `Span`, likewise low and high.
-        low: see there.
-        high: see there.
-        thick: half the thickness of a lens, metres: thin elements have none, and are drawn with a symbol.
+        axis: see `Span`.
+        low: see `Span`.
+        high: see `Span`.
+        thick: half the thickness of a lens symbol, metres; thin elements have no thickness.
         axes: in millimetres.
     """
 
@@ -92,15 +92,15 @@ class Pen(Span):
         self.axes.plot(np.asarray(z) / mm, np.asarray(height) / mm, **options)
 
     def glass(self, z: Any, height: Any, bounded: bool, **options: Any) -> None:
-        """A closed piece of glass, its outline dashed where it has no rim."""
+        """A closed piece of glass; its outline is dashed if it has no rim."""
         looks = {"facecolor": style.GLASS, "edgecolor": style.GLASS_EDGE, "alpha": 0.85, "linewidth": 1.2}
         self.fill(z, height, linestyle="-" if bounded else (0, (4, 2)), **{"zorder": 1, **looks, **options})
 
 
 def half_size(element: Element, axis: int) -> float:
-    """Half the height of an element, metres; infinite where it has no rim.
+    """Half the height of an element, metres; infinite without a rim.
 
-    Of a thick one, half the widest beam of light from far away that gets through any of its openings.
+    For a thick element, half the widest beam of distant light that passes one of its openings.
     """
     halves = []
     for crossing in crossings(element):
@@ -112,18 +112,17 @@ def half_size(element: Element, axis: int) -> float:
 
 
 def half_opening(faces: Faces, axis: int) -> float:
-    """Half the height of what lets light through, metres; infinite where all does."""
+    """Half the height of the opening, metres; infinite without one."""
     return math.inf if faces.pattern is None else faces.pattern.size[axis] / 2
 
 
 def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
-    """Draw an element in its place.
+    """Draw an element at its position.
 
     Args:
         pen: where and how large.
         element: what to draw.
-        beam: half the height of the rays that are drawn through it, metres: a thick element whose rims are not
-            known is drawn as high.
+        beam: half the height of the rays through it, metres: the drawn size of a thick element with unknown rims.
     """
     planes = crossings(element)
     if len(planes) > 1 or element.length > 0:
@@ -139,7 +138,7 @@ def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
 
 
 def _draw_lens(pen: Pen, lens: Lens) -> None:
-    """Two arcs, bulging for a converging lens and hollow for a diverging one; a stop outside the rim."""
+    """Two arcs, convex for a converging lens and concave for a diverging one; a stop outside the rim."""
     half = lens.diameter / 2 if lens.diameter is not None else 1.02 * pen.half
     across = np.linspace(-1, 1, 41)
     bulge = 1 - across**2
@@ -158,7 +157,7 @@ def _draw_prism(pen: Pen, prism: Prism) -> None:
     """A wedge, thick on the side to which it deflects."""
     half = 1.02 * pen.half
     side = 1.0 if prism.deflection[pen.axis] >= 0 else -1.0
-    flat = prism.deflection[pen.axis] == 0  # it deflects along the other axis only
+    flat = prism.deflection[pen.axis] == 0  # deflects along the other axis only
     middle = (pen.low + pen.high) / 2
     top, base = middle - half * side, middle + half * side
     tip = pen.thick if flat else 0.05 * pen.thick
@@ -168,7 +167,7 @@ def _draw_prism(pen: Pen, prism: Prism) -> None:
 
 
 def _draw_block(pen: Pen, element: Element, planes: list[Crossing], beam: float) -> None:
-    """A thick element: glass from end to end, its rims and stop, and principal planes where there are any."""
+    """A thick element: glass from end to end, its rims and stop, and principal planes if it has any."""
     centre = element.decentre[pen.axis]
     half = half_size(element, pen.axis)
     bounded = math.isfinite(half)
@@ -203,7 +202,7 @@ def _draw_block(pen: Pen, element: Element, planes: list[Crossing], beam: float)
 
 
 def _principal_planes(element: Element) -> list[tuple[float, str, int]]:
-    """(z, name, side of the line on which the name has room) of each."""
+    """(z, name, side of the line with space for the name) of each principal plane."""
     if not isinstance(element, FirstOrder):
         return []
     try:
@@ -215,7 +214,7 @@ def _principal_planes(element: Element) -> list[tuple[float, str, int]]:
 
 
 def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
-    """Any thin element: glass that bends as it does, a frosted sheet where it scatters, black where it stops."""
+    """Any thin element: glass that bends as the element does, frosted if it scatters, black where it is opaque."""
     bends, scatters = faces.deflection is not None, faces.spread is not None
     half = half_opening(faces, pen.axis)
     if bends:
@@ -241,14 +240,14 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
 
 
 def drawn_range(pen: Span, element: Element, half: float) -> tuple[float, float]:
-    """From which to which height, from its middle, an element is drawn, metres."""
+    """The range of heights in which an element is drawn, relative to its centre, metres."""
     centre = element.decentre[pen.axis]
     margin = 0.02 * pen.half
     return max(-half, pen.low - margin - centre), min(half, pen.high + margin - centre)
 
 
 def along(axis: int, places: Array) -> tuple[Array, Array]:
-    """(x, y) of places on the drawn line through an element's middle."""
+    """(x, y) of positions on the drawn line through an element's centre."""
     return (places, np.zeros_like(places)) if axis == 0 else (np.zeros_like(places), places)
 
 
@@ -262,7 +261,7 @@ def _all_clear(pen: Pen, element: Element, faces: Faces) -> bool:
 
 
 def magnification(element: Element, faces: Faces, axis: int, bottom: float, top: float) -> int:
-    """By how much the cells of an array are drawn larger, so that they can be told apart; 1 of what has no cells.
+    """By which factor the cells of an array are enlarged to be visible; 1 for elements without cells.
 
     Args:
         element: the array.
@@ -280,16 +279,16 @@ def magnification(element: Element, faces: Faces, axis: int, bottom: float, top:
 
 
 def glass_profile(span: Span, element: Element, faces: Faces) -> tuple[Array, Array] | None:
-    """The shape of a thin piece of glass that bends rays as an element does.
+    """The profile of a thin piece of glass that bends rays as an element does.
 
     Args:
-        span: what is drawn.
+        span: the drawn range.
         element: the element.
-        faces: its faces, which bend.
+        faces: its faces, with a deflection.
 
     Returns:
-        Heights from the element's middle, metres, and the depth of the glass there, 0 to 1; None where nothing of
-        it lies within the drawing.
+        Heights relative to the element's centre, metres, and the depth of the glass there, 0 to 1; None if the
+        element is outside the drawing.
     """
     low, high = drawn_range(span, element, half_opening(faces, span.axis))
     if high <= low:
@@ -305,7 +304,7 @@ def glass_profile(span: Span, element: Element, faces: Faces) -> tuple[Array, Ar
 
 
 def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
-    """Glass flat at the element's place; towards the scene it has the profile of its optical path."""
+    """Glass that is flat at the element's position, with the profile of its optical path towards the scene."""
     profile = glass_profile(pen, element, faces)
     if profile is None:
         return
@@ -319,8 +318,8 @@ def _draw_glass(pen: Pen, element: Element, faces: Faces) -> None:
 
 
 def _profile(faces: Faces, axis: int, places: Array) -> Array:
-    """The optical path along the drawn line, from 0 on, metres: the integral of the slopes that rays gain."""
-    # In the middles between places: at a place two facets may meet.
+    """The optical path along the drawn line, minimum 0, metres: the integral of the change of slope."""
+    # At midpoints: at the points themselves two facets may meet.
     x, y = along(axis, (places[1:] + places[:-1]) / 2)
     if faces.affine is not None:
         slopes = faces.affine(np.stack([x, y, 0 * x, 0 * x], axis=-1))[:, 2 + axis]
@@ -329,12 +328,12 @@ def _profile(faces: Faces, axis: int, places: Array) -> Array:
         slopes = np.asarray(faces.bending(x, y)[axis])
     path = np.concatenate([[0.0], np.cumsum(np.diff(places) * slopes)])
     path -= path.min()
-    # What rounding leaves of a plane is no shape.
+    # Rounding errors of a plane are not a shape.
     return path if path.max() > 1e-12 * max(1e-3, float(np.ptp(places))) else np.zeros_like(path)
 
 
 def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, scale: int) -> tuple[Array, Array]:
-    """Heights, and each cell's glass there above its thinnest place, metres; cells ``scale`` times as large."""
+    """Heights, and the thickness of each cell's glass above its minimum, metres; cells ``scale`` times larger."""
     lattice = cells.lattice
     count = (high - low) / (lattice.pitch * scale)
     places = np.linspace(low, high, int(min(max(24 * count, POINTS), 4000)))
@@ -351,7 +350,7 @@ def _cell_profile(cells: CellDeflection, axis: int, low: float, high: float, sca
 
 
 def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> None:
-    """A sheet with a rough side towards the sensor; where it scatters more it is rougher and darker."""
+    """A sheet with a rough side towards the sensor; rougher and darker where it scatters more."""
     low, high = drawn_range(pen, element, half)
     if high <= low:
         return
@@ -359,7 +358,7 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
     height = np.linspace(low, high, 2 * teeth + 1)
     spread = spread_along(scatter, pen.axis, *along(pen.axis, height))
     strength = spread / spread.max() if spread.max() > 0 else 0 * spread
-    # The teeth are uneven, as ground glass is, and the same on every drawing.
+    # Uneven teeth, as on ground glass, but the same in each drawing.
     tooth = np.where(np.arange(len(height)) % 2 == 0, 0.0, np.random.default_rng(0).uniform(0.4, 1, len(height)))
     centre, thick = element.decentre[pen.axis], pen.thick
     pen.fill(
@@ -387,8 +386,7 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
 
 
 def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
-    """What has neither a known shape nor a transmission by position: a thin sheet, dotted if it filters "
-    "directions."""
+    """An element without known shape or transmission by position: a thin sheet, dotted if it filters directions."""
     middle = (pen.low + pen.high) / 2
     ends = middle + 1.02 * pen.half * np.array([-1, 1])
     looks: dict[str, Any] = {"dashes": (1, 1)} if by_direction else {}
@@ -396,8 +394,7 @@ def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
 
 
 def _draw_louvre(pen: Pen, louvre: Louvre) -> None:
-    """Its walls, where the drawing's plane cuts them; a dotted sheet if it runs along them or they are too "
-    "many."""
+    """The walls in the drawing's plane; a dotted sheet if it is parallel to them or they are too many."""
     across = math.cos(louvre.rotation) if pen.axis == 0 else math.sin(louvre.rotation)
     pitch = louvre.pitch / max(abs(across), 1e-9)
     if 2 * pen.half / pitch > MOST_WALLS:
@@ -423,32 +420,32 @@ def _draw_louvre(pen: Pen, louvre: Louvre) -> None:
 def mask_bar(
     span: Span, element: Element, pattern: Pattern, scale: int = 1, points: int = 1024
 ) -> tuple[Array, Array] | None:
-    """The middle row of a mask as pieces that let through alike.
+    """The middle row of a mask as pieces of constant transmission.
 
     Args:
-        span: what is drawn.
+        span: the drawn range.
         element: the mask.
-        pattern: of it.
-        scale: by how much it is drawn larger, see `magnification`.
-        points: at which it is looked at.
+        pattern: of the mask.
+        scale: enlargement, see `magnification`.
+        points: number of points at which the pattern is evaluated.
 
     Returns:
-        The edges of the pieces, metres on the drawing, and what each lets through, one fewer; None where nothing
-        of the mask lies within the drawing.
+        The edges of the pieces, metres on the drawing, and the transmission of each piece, one fewer; None if
+        the mask is outside the drawing.
     """
     low, high = drawn_range(span, element, pattern.size[span.axis] / 2)
     if high <= low:
         return None
     steps = (np.arange(points) + 0.5) / points
     values = np.asarray(pattern(*along(span.axis, (low + (high - low) * steps) / scale)))
-    # Neighbours that are alike become one piece, so that a picture for print stays small.
+    # Merge equal neighbours, so that vector files stay small.
     cuts = np.flatnonzero(np.diff(values)) + 1
     edges = low + (high - low) * np.concatenate([[0.0], cuts / points, [1.0]]) + element.decentre[span.axis]
     return edges, values[np.concatenate([[0], cuts])]
 
 
 def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, over_glass: bool = False) -> None:
-    """The mask's middle row as a bar, black where it is opaque and white (on glass: nothing) where it is open."""
+    """The mask's middle row as a bar, black where opaque and white (on glass: transparent) where open."""
     bar = mask_bar(pen, element, pattern, scale, 1024 if scale == 1 and not over_glass else 4096)
     if bar is None:
         return
@@ -479,7 +476,7 @@ def _draw_mask(pen: Pen, element: Element, pattern: Pattern, scale: int = 1, ove
 
 
 def _draw_stop(pen: Pen, z: float, centre: float, half: float, reach: float = math.inf) -> None:
-    """The opaque surroundings of an opening: heavy at its edge, thin further out, no further than ``reach``."""
+    """The opaque surroundings of an opening: thick at the edge, thin farther out, up to ``reach``."""
     for side in (-1, 1):
         edge = centre + side * half
         border = (pen.high if side > 0 else pen.low) + side * 0.06 * pen.half
@@ -491,7 +488,7 @@ def _draw_stop(pen: Pen, z: float, centre: float, half: float, reach: float = ma
 
 
 def draw_sensor(pen: Pen, sensor: Sensor, most_pixels: int = 0) -> None:
-    """The sensor, and the borders of its pixels where no more than so many lie within the drawing."""
+    """The sensor, with the borders of its pixels if at most ``most_pixels`` are within the drawing."""
     half, thick = sensor.size[1 - pen.axis] / 2, 1.25 * pen.thick
     centre = sensor.decentre[pen.axis]
     low, high = max(centre - half, pen.low - pen.half), min(centre + half, pen.high + pen.half)

@@ -1,4 +1,4 @@
-"""Which rays show what a camera does: fans from a point in focus, from a nearer one, and from one off the axis."""
+"""Choose rays for drawings: fans from a point in focus, from a nearer one, and from one off the axis."""
 
 from __future__ import annotations
 
@@ -18,29 +18,30 @@ from vcc.plot.elements import half_size
 from vcc.plot.tracing import Paths, fan, openings, trace
 
 RAYS = 9
-"""In each fan from a point on the axis; odd, so that one goes along the axis."""
+"""Rays per fan from a point on the axis; odd, so that one is on the axis."""
 RAYS_THAT_SPLIT = 5
-"""In each fan where diffusers split rays."""
+"""Rays per fan if diffusers split rays."""
 OFF_AXIS_RAYS = 3
-"""In the fan from a point off the axis."""
+"""Rays per fan from a point off the axis."""
 SCENE_SHARE = 0.45
-"""How much of the scene's side is drawn, as a share of the camera's length."""
+"""Length of the scene's side that is drawn, as a share of the camera's length."""
 NEAR_BLUR = 0.25
-"""The nearer point is taken so near that it blurs over this share of the entrance."""
+"""The nearer point is so near that its blur covers this share of the entrance."""
 
 
 def focused_distance(camera: Train) -> float | None:
-    """How far before the entrance plane a point must be to be sharp on the sensor, metres.
+    """The distance before the entrance plane at which a point is sharp on the sensor, metres.
 
-    With position and slope at the entrance mapped to a plane by x = A·u + B·s, a point at distance Z sends
-    s = u/Z, and all its rays meet there where A + B/Z = 0. The plane is the sensor's; or the one that an array of
-    lenslets of focal length f, b before the sensor, relays to it: a before the array, 1/a + 1/b = 1/f (Lumsdaine
-    and Georgiev 2009). At b = f, where a is infinite, optics before the array are taken to be focused on the array
-    itself (Ng et al. 2005). Of lenslets of several focal lengths it is the first.
+    Position and slope at the entrance map to position x = A·u + B·s at a plane. A point at distance Z sends s
+    = u/Z, and all its rays meet at this plane if A + B/Z = 0. The plane is the sensor's, or the one that an
+    array of lenslets of focal length f, at b before the sensor, relays to it: a before the array, 1/a + 1/b =
+    1/f (Lumsdaine and Georgiev 2009). For b = f, where a is infinite, the optics before the array are assumed
+    to be focused on the array itself (Ng et al. 2005). If lenslets have several focal lengths, the first one
+    counts.
 
     Returns:
-        The distance; infinite if parallel light is brought to a point; None if no real point is
-        sharp (a camera without a lens, or one focused beyond infinity).
+        The distance; infinite if parallel light is focused; None if no real point is sharp (a camera without a
+        lens, or one focused beyond infinity).
     """
     matrix = _to_focus(camera).matrix
     position, slope = float(matrix[0, 0]), float(matrix[0, 2])
@@ -51,7 +52,7 @@ def focused_distance(camera: Train) -> float | None:
 
 
 def _lenslets(camera: Train) -> Stage | None:
-    """The last array of cells with a power, before the sensor and not on it."""
+    """The last array of cells with optical power before the sensor, and not on it."""
     found = None
     for stage in camera.stages:
         cells = stage.faces.bending
@@ -61,11 +62,11 @@ def _lenslets(camera: Train) -> Stage | None:
 
 
 def plane_to_focus(camera: Train) -> tuple[float, float]:
-    """Where a picture must stand to be sharp on the sensor, metres.
+    """The plane where an image must be to be sharp on the sensor, metres.
 
     Returns:
-        The place up to which elements count, that of the sensor or of the last array of lenslets; and how far from
-        there the plane is, which lenslets look at.
+        The z up to which elements count, that of the sensor or of the last array of lenslets; and the
+        distance from there to the plane that lenslets image.
     """
     stage = _lenslets(camera)
     if stage is None:
@@ -77,13 +78,13 @@ def plane_to_focus(camera: Train) -> tuple[float, float]:
 
 
 def _to_focus(camera: Train) -> Affine:
-    """Rays from the entrance plane to the plane in which a picture must stand to be sharp on the sensor."""
+    """Map of rays from the entrance plane to the plane where an image must be to be sharp on the sensor."""
     z, beyond = plane_to_focus(camera)
     if z == camera.sensor.z:
         return camera.rays_at(z, before=True)
     to_array = camera.rays_at(z)
     if beyond == 0.0 and (to_array.matrix[2, 0] == 0 or to_array.matrix[0, 2] == 0):
-        # Nothing before the array can focus on it: light that is parallel there is sharp, x = s.
+        # Nothing before the array can focus on it: parallel light is sharp there, x = s.
         return Affine.abcd(((0.0, 1.0), (-1.0, 0.0))) @ to_array
     return Affine.propagation(beyond) @ to_array
 
@@ -94,9 +95,9 @@ class Point:
 
     Args:
         distance: before the entrance plane, metres; may be infinite.
-        offset: its place off the axis as a slope.
-        role: why it is shown: ``"focused"``, ``"near"``, ``"off axis"`` or ``"given"``.
-        label: in words.
+        offset: its position off the axis, as a slope.
+        role: why it is drawn: ``"focused"``, ``"near"``, ``"off axis"`` or ``"given"``.
+        label: as text.
     """
 
     distance: float
@@ -106,16 +107,16 @@ class Point:
 
 
 def points_to_show(camera: Train, distances: Sequence[float] | None, axis: int) -> list[Point]:
-    """The points whose rays show what a camera does.
+    """The points whose rays show how a camera works.
 
     Args:
-        camera: through which they go.
-        distances: of points on the axis, metres; None takes the distance in focus, also off the axis, and a nearer
-            one.
+        camera: for the rays.
+        distances: of points on the axis, metres; None uses the distance in focus, on and off the axis, and a
+            nearer one.
         axis: 0 for x, 1 for y.
 
     Raises:
-        InputError: a distance of 0 or less.
+        InputError: a distance that is not positive.
     """
     if distances is not None:
         for distance in distances:
@@ -145,7 +146,7 @@ def _away(distance: float) -> str:
 
 
 def scene_length(camera: Train, points: Sequence[Point]) -> float:
-    """How much of the scene's side to draw, metres: a piece, or up to points that are close."""
+    """Length of the scene's side to draw, metres: a fixed part, or up to points that are close."""
     shown = SCENE_SHARE * (camera.sensor.z or 10 * mm)
     near = [point.distance for point in points if point.distance < 2.5 * shown]
     return max([shown, *(1.08 * distance for distance in near)])
@@ -159,14 +160,14 @@ def trace_point(
     rays: int,
     start: float,
 ) -> Paths:
-    """The fan from a point; it starts at the point itself where that is in the drawing.
+    """The fan from a point; it starts at the point itself if that is in the drawing.
 
     Args:
-        camera: through which it goes.
-        point: where it comes from.
-        light_field: whose width on the entrance plane it fills; None fills the first lens with a rim.
+        camera: for the rays.
+        point: of the scene.
+        light_field: the fan fills its width on the entrance plane; None fills the first lens with a rim.
         axis: 0 for x, 1 for y.
-        rays: how many.
+        rays: number of rays.
         start: of the drawing, metres, 0 or less.
     """
     low, high = _entrance(camera, point, light_field, axis)
@@ -175,12 +176,12 @@ def trace_point(
 
 
 def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: int) -> tuple[float, float]:
-    """From where to where on the entrance plane the rays of a point go, metres."""
+    """The range on the entrance plane that the rays of a point fill, metres."""
     if light_field is not None:
         return _through_views(point, light_field, axis)
     found = list(openings(camera, axis))
     lenses = [one for one in found if isinstance(one[0], Lens | FirstOrder)]
-    # A lens's rim says more about a camera than a mask's sheet; of a thick one all rims count.
+    # A lens's rim is more characteristic than a mask's border; for a thick lens all rims count.
     first = (lenses or found)[:1]
     rims = [one for one in found if one[0] is first[0][0]] if first else []
     low, high = -math.inf, math.inf
@@ -188,7 +189,7 @@ def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: i
         matrix = ray.matrix
         growth = float(matrix[axis, axis] + matrix[axis, axis + 2] / point.distance)
         if growth:
-            # Just inside: the outermost ray must not end at the rim by rounding.
+            # Slightly inside: rounding must not stop the outermost ray at the rim.
             reach = 0.97 * half / abs(growth)
             shift = element.decentre[axis] - matrix[axis, 4] + matrix[axis, axis + 2] * point.offset
             low, high = max(low, shift / growth - reach), min(high, shift / growth + reach)
@@ -199,14 +200,14 @@ def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: i
 
 
 def _through_views(point: Point, light_field: InMemory, axis: int) -> tuple[float, float]:
-    """Where the rays of a point that pass the outer borders of the views meet the entrance plane, metres.
+    """Positions on the entrance plane of the rays of a point that pass the outer borders of the views, metres.
 
-    The border's pixel k that sees the point is the one whose place x and slope s have s = x/Z − offset, as its
-    rays do; where the views stand in the entrance plane, x does not depend on k.
+    The border's pixel k that sees the point has position x and slope s with s = x/Z − offset, as the point's
+    rays. If the views are in the entrance plane, x does not depend on k.
     """
     counts, linear, offset = light_field.shape[1::-1], light_field.frame.linear, light_field.frame.offset
     middle = np.array([(count - 1) / 2 for count in (*counts, light_field.shape[3], light_field.shape[2])])
-    aside = np.where(np.arange(4) % 2 == axis, 0.0, middle)  # of the other axis the middle
+    aside = np.where(np.arange(4) % 2 == axis, 0.0, middle)  # centre along the other axis
     place, slope = (linear[n] @ aside + offset[n] for n in (axis, axis + 2))
     by_view, by_pixel = linear[np.ix_([axis, axis + 2], [axis, axis + 2])].T
     borders = np.array([-0.5, counts[axis] - 0.5])
@@ -218,7 +219,7 @@ def _through_views(point: Point, light_field: InMemory, axis: int) -> tuple[floa
 
 
 def half_height(camera: Train, paths: Sequence[Paths], axis: int) -> float:
-    """Half the height of a drawing, metres: bounded elements, the sensor, and rays within reason."""
+    """Half the height of a drawing, metres: bounded elements, the sensor, and rays within limits."""
     sizes = [camera.sensor.size[1 - axis] / 2 + abs(camera.sensor.decentre[axis])]
     halves = [(half_size(element, axis), abs(element.decentre[axis])) for element in camera.elements]
     sizes += [1.08 * half + decentre for half, decentre in halves if math.isfinite(half)]
@@ -227,7 +228,7 @@ def half_height(camera: Train, paths: Sequence[Paths], axis: int) -> float:
 
 
 def beam_at(element: Element, paths: Sequence[Paths], axis: int) -> float:
-    """Half the height, around an element's middle, of the rays that are drawn through it, metres."""
+    """Half the height of the drawn rays, relative to an element's centre, metres."""
     highest = 0.0
     for path in paths:
         inside = (path.z >= element.z) & (path.z <= element.z + element.length) & (path.z < path.z[-1])

@@ -1,4 +1,4 @@
-"""What a drawing calls its elements: their words, and the labels side by side above them."""
+"""Labels of elements in a drawing: their texts, and their places side by side above the drawing."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from vcc.plot.tracing import spread_along
 from vcc.shapes.surfaces import Surface
 
 LONGEST_WORDS = 26
-"""Letters of a surface's description on a label; of a longer one only the kind is told."""
+"""Longest description of a surface on a label, in characters; a longer one is reduced to its kind."""
 LABEL_GAP = 14
 """Pixels between labels."""
 
 
 def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
-    """What each thing is, side by side above the drawing, each with a line to its place."""
+    """Label all elements and the sensor, side by side above the drawing, each with a line to its position."""
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
@@ -69,7 +69,7 @@ def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
         )
         for z, words in _merged(things)
     ]
-    # The layout of an own figure follows the labels, and they follow it.
+    # The layout of a new figure depends on the labels, and the labels on the layout.
     for _ in range(2 if own_figure else 1):
         if own_figure:
             figure = pen.axes.figure
@@ -85,14 +85,14 @@ def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
 
 
 def spread(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
-    """Middles of things side by side that do not overlap, as near to the wanted ones as can be.
+    """Centres of objects side by side without overlap, as close to the wanted ones as possible.
 
     Args:
-        wanted: the middles asked for, increasing.
-        widths: of the things, in the same unit.
+        wanted: wanted centres, increasing.
+        widths: of the objects, in the same unit.
     """
-    # Without the room that all before it take, "no overlap" is "not decreasing", and the nearest
-    # such sequence has the means of groups that would decrease (pool adjacent violators).
+    # After subtracting the space of all objects before, "no overlap" means "not decreasing". The nearest
+    # such sequence consists of the means of groups that would decrease (pool adjacent violators).
     room = np.concatenate([[0.0], np.cumsum((np.array(widths[:-1]) + np.array(widths[1:])) / 2)])
     groups: list[list[float]] = []
     for place in np.array(wanted) - room:
@@ -105,7 +105,7 @@ def spread(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
 
 
 def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
-    """Things at one place share a label."""
+    """Merge the labels of objects at the same position."""
     merged: list[tuple[float, str]] = []
     for z, words in things:
         if merged and merged[-1][0] == z:
@@ -115,11 +115,11 @@ def _merged(things: list[tuple[float, str]]) -> list[tuple[float, str]]:
     return merged
 
 
-# --- words ---
+# --- texts ---
 
 
 def label_of(element: Element, pen: Span) -> str:
-    """What stands above an element: its kind and name, and what matters most of it."""
+    """The label of an element: its kind and name, and its most important parameters."""
     first = element.called
     for kind, words in _WORDS.items():
         if isinstance(element, kind):
@@ -128,7 +128,7 @@ def label_of(element: Element, pen: Span) -> str:
 
 
 def length_in_words(value: float) -> str:
-    """A length on a drawing, to 4 digits."""
+    """A length for a drawing, to 4 digits."""
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     return short(value, digits=4).replace("um", "µm").replace("-", "−")

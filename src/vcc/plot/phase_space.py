@@ -1,4 +1,4 @@
-"""Light fields in phase space: the u–s diagram in which optics is geometry (the paper's Figure 4)."""
+"""Light fields in phase space: the u–s diagram, in which optics are geometry (the paper's Figure 4)."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 NO_OPTICS = Train([], Sensor(0.0, (1, 1), 1.0))
-"""What a light field meets that is drawn where it is."""
+"""A camera without elements, for drawing a light field where it is."""
 ENTRANCE = "entrance, z = 0 mm"
 CELLS_DRAWN_ONE_BY_ONE = 20_000
-"""More cells than this are one picture inside a .svg or .pdf, which would grow too large otherwise."""
+"""More cells than this are rasterised in .svg and .pdf files, which would otherwise grow too large."""
 
 
 def plot_phase_space(
@@ -61,29 +61,29 @@ def plot_phase_space(
 ) -> Axes:
     """Draw the u–s diagram of a light field: position across, slope up, as the paper's Figure 4(c).
 
-    One 2-D slice, with one row of views and one row of pixels held. Each sample is drawn as the cell
-    that it stands for, placed by the frame: nothing is resampled, so flight shows as a shear along
-    u, a lens as one along s. Grey is where the light field holds nothing.
+    It is a 2-D slice for one row of views and one row of pixels. Each sample is drawn as its cell, placed by
+    the frame: nothing is resampled, so that free propagation is a shear along u, and a lens a shear along s.
+    Areas without samples are grey.
 
-    Other slices hold the other two coordinates: ``across="uv"`` shows what comes from one direction, and
-    ``"st"`` what one place of this plane sees, upright: light from the right has s < 0. They are interpolated
-    linearly between samples.
+    Other slices fix the other two coordinates: ``across="uv"`` shows light from one direction, and ``"st"``
+    light at one point of this plane, upright: light from the right has s < 0. They are interpolated linearly
+    between samples.
 
     Args:
         light_field: at any plane.
-        row: which row of views (v); None takes the middle one. A column of views for across="v".
-        pixel_row: which row of pixels (t); None takes the middle one; a column for across="v".
-        across: ``"u"`` draws u and s, ``"v"`` draws v and t; or two of u, v, s and t, the one to the right first.
-        fixed: the other two coordinates instead of rows, in the order u, v, s, t: metres and slopes. None takes
-            the middle of the light field, where ``across`` is neither u and s nor v and t.
-        white: the radiance drawn white; None takes the brightest of the slice.
+        row: which row of views (v); None uses the middle one. A column of views for across="v".
+        pixel_row: which row of pixels (t); None uses the middle one; a column for across="v".
+        across: ``"u"`` draws u and s, ``"v"`` draws v and t; or two of u, v, s and t, the horizontal one first.
+        fixed: the other two coordinates instead of rows, in the order u, v, s, t: metres and slopes. None uses the
+            middle of the light field, unless ``across`` is u and s or v and t.
+        white: the radiance drawn white; None uses the maximum of the slice.
         axes: where to draw; None makes a new figure.
 
     Returns:
         The axes; ``.figure.savefig(path)`` writes them to a file.
 
     Raises:
-        InputError: no such row, another axis, rows beside ``fixed``, or rays that the light field does not hold.
+        InputError: an invalid row or axis, rows together with ``fixed``, or rays outside the light field.
     """
     chosen = slice_of(across)
     axes = style.new_axes(5.2, 4.2) if axes is None else axes
@@ -123,21 +123,21 @@ def plot_phase_space_stages(
     across: str = "u",
     fixed: tuple[float, float] | None = None,
 ) -> Figure:
-    """Draw u–s diagrams on the way through a camera: entrance, behind each element, on the sensor.
+    """Draw u–s diagrams along the way through a camera: at the entrance, behind each element, on the sensor.
 
-    All have the same scales and the same white, so that what each element does can be seen: the
-    paper's Figure 4(c) for any camera. Behind lens arrays, prisms of several faces, phase plates and diffusers the
-    slice's rays are traced and laid out in a raster; before, its cells are drawn as they are.
+    All diagrams have the same scales and the same white, so that the effect of each element is visible: the
+    paper's Figure 4(c) for any camera. Behind lens arrays, prisms of several faces, phase plates and
+    diffusers, the slice's rays are traced and collected in a raster; before these, its cells are drawn.
 
-    What is followed is the slice at the entrance: rays whose other two coordinates are held there. Where optics
-    change these too (lenslets off the row, say), the picture shows where the rays come to lie, whatever the others
-    are then. A diffuser spreads light along the slope drawn; what it scatters out of the slice is taken to be made
-    up by slices beside it.
+    The slice is chosen at the entrance: its rays have fixed values of the other two coordinates there. If
+    optics change these as well (for example lenslets off the row), the diagram shows the positions of the
+    rays in the two drawn coordinates, for any values of the others. A diffuser spreads light along the drawn
+    slope; the light that it scatters out of the slice is assumed to be replaced by neighbouring slices.
 
     Args:
-        camera: through which the light field goes.
+        camera: the camera.
         light_field: at the entrance plane.
-        row: as in `plot_phase_space`, likewise the next three.
+        row: as in `plot_phase_space`, also the next three.
         pixel_row: which row of pixels.
         across: two coordinates.
         fixed: the other two, at the entrance plane.
@@ -146,13 +146,13 @@ def plot_phase_space_stages(
         The figure; ``.savefig(path)`` writes it to a file.
 
     Raises:
-        InputError: what `plot_phase_space` refuses, or a diffuser in a slice other than of a place and its slope.
+        InputError: as for `plot_phase_space`, or a diffuser for a slice other than of a position and its slope.
     """
     chosen = slice_of(across)
     titles = [(-1.0, ENTRANCE), *_planes(camera)]
     cells: dict[float, InMemory] = {}
     if _held_by_samples(chosen, row, pixel_row, fixed):
-        piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first: what follows works on few samples
+        piece = _slice(light_field, row, pixel_row, NAMES[chosen[0]])  # first: fewer samples for later steps
         cells = {
             z: piece if z < 0 else carried_to(camera, piece, z) for z, _ in titles if z < _traced_from(camera)
         }
@@ -197,14 +197,14 @@ def phase_space_stages(
     fixed: tuple[float, float] | None = None,
     rays: int = RAYS,
 ) -> list[PhaseSpacePicture]:
-    """The numbers that `plot_phase_space_stages` draws: rasters of radiance at each plane, by traced rays.
+    """The data of `plot_phase_space_stages`: rasters of radiance at each plane, from traced rays.
 
     Args:
-        camera: through which the light field goes; this and what follows as there.
-        rays: about how many are traced, 1 or more.
+        camera: the camera; the other arguments as in `plot_phase_space_stages`.
+        rays: approximate number of traced rays, 1 or more.
 
     Raises:
-        InputError: as there.
+        InputError: as for `plot_phase_space_stages`.
     """
     sheet = _sheet(light_field, across, (row, pixel_row), fixed)
     return list(traced(camera, sheet, {-1.0: ENTRANCE} | dict(_planes(camera)), rays=_some(rays)))
@@ -222,22 +222,22 @@ def phase_space_at(
     rays: int = RAYS,
     raster: tuple[int, int] = RASTER,
 ) -> PhaseSpacePicture:
-    """A raster of radiance as `phase_space_stages` gives it, at any plane of the axis.
+    """A raster of radiance, as from `phase_space_stages`, at any plane of the axis.
 
     Args:
-        camera: through which the light field goes.
+        camera: the camera.
         light_field: at the entrance plane.
-        z: of the plane, metres, up to the sensor's; below 0 before the camera. Where an element stands, the plane
-            is just behind it.
-        row: as in `plot_phase_space_stages`, likewise the next three.
+        z: of the plane, metres, up to the sensor's; negative before the camera. If an element is there, the
+            plane is just behind it.
+        row: as in `plot_phase_space_stages`, also the next three.
         pixel_row: which row of pixels.
         across: two coordinates.
         fixed: the other two, at the entrance plane.
-        rays: about how many are traced, 1 or more.
-        raster: (columns, rows) of the picture.
+        rays: approximate number of traced rays, 1 or more.
+        raster: (columns, rows) of the image.
 
     Raises:
-        InputError: as there; a plane behind the sensor or within a thick element.
+        InputError: as for `phase_space_stages`; a plane behind the sensor or inside a thick element.
     """
     sheet, z = _sheet(light_field, across, (row, pixel_row), fixed), checks.finite("z of a plane", z, "metres")
     place = short(z, digits=6)
@@ -247,11 +247,11 @@ def phase_space_at(
         return replace(picture, z=z)
     if z > camera.sensor.z and not touch(z, camera.sensor.z):
         raise InputError(f"z = {place} lies behind the sensor, which stands at z = {short(camera.sensor.z)}")
-    camera.rays_at(z)  # which refuses what lies inside of a thick element
+    camera.rays_at(z)  # raises an error inside a thick element
     met = [one for one in camera.elements if one.z < z or touch(one.z, z)]
     behind = [one.called for one in met if touch(one.z + one.length, z)]
     title = f"behind {' and '.join(behind)}, z = {place}" if behind else f"z = {place}"
-    z = max([z, *(one.z + one.length for one in met)])  # but for rounding the same
+    z = max([z, *(one.z + one.length for one in met)])  # the same, to rounding
     return list(
         traced(
             Train(met, Sensor(z, (1, 1), 1.0)), sheet, {-1.0: ENTRANCE, z: title}, rays=_some(rays), raster=raster
@@ -265,7 +265,7 @@ def _sheet(
     rows: tuple[int | None, int | None],
     fixed: tuple[float, float] | None,
 ) -> Sheet:
-    """The slice that is followed."""
+    """The slice to follow."""
     chosen = slice_of(across)
     if _held_by_samples(chosen, *rows, fixed):
         return sheet_of_samples(_slice(light_field, *rows, NAMES[chosen[0]]), chosen)
@@ -274,27 +274,27 @@ def _sheet(
 
 def _some(rays: int) -> int:
     if not rays >= 1:
-        raise InputError(f"rays is a number from 1 on, not {rays}")
+        raise InputError(f"rays must be 1 or more, not {rays}")
     return rays
 
 
 def _held_by_samples(
     chosen: tuple[int, int], row: int | None, pixel_row: int | None, fixed: tuple[float, float] | None
 ) -> bool:
-    """Whether rows of samples are held, rather than coordinates."""
+    """Whether rows of samples are fixed, rather than coordinates."""
     if chosen in IN_ONE_PLANE and fixed is None:
         return True
     if row is not None or pixel_row is not None:
         names = [NAMES[n] for n in range(4) if n not in chosen]
         raise InputError(
-            "row and pixel_row hold samples for u and s, or v and t, alone: give the coordinates that are held as "
+            "row and pixel_row are supported only for u and s, or v and t: pass the fixed coordinates as "
             f"fixed=({names[0]}, {names[1]})"
         )
     return False
 
 
 def _traced_from(camera: Train) -> float:
-    """The z of the first plane behind which a frame no longer holds the cells."""
+    """The z of the first plane behind which cells are no longer given by a frame."""
     for element in camera.elements:
         for part in element.parts():
             if isinstance(part, Faces) and (part.bending is not None or part.spread is not None):
@@ -303,7 +303,7 @@ def _traced_from(camera: Train) -> float:
 
 
 def _draw_picture(axes: Axes, picture: PhaseSpacePicture, chosen: tuple[int, int], white: float) -> None:
-    """A raster, fading into the grey of nothing where its cells are filled in part."""
+    """Draw a raster; partly filled cells fade into the grey of empty areas."""
     shown = np.asarray(_for_display(picture.radiance / white), dtype=np.float64)
     shown = shown if shown.ndim == 3 else np.repeat(shown[..., None], 3, axis=2)
     axes.set_facecolor(style.NOTHING)
@@ -328,7 +328,7 @@ def _label(axes: Axes, chosen: tuple[int, int]) -> None:
 
 
 def _set_limits(axes: Axes, pictures: list[PhaseSpacePicture], chosen: tuple[int, int]) -> None:
-    """All of the pictures in view, as one sees them: v downwards, rays from the right (s < 0) at the right."""
+    """Show all images, in the viewing direction: v downwards, rays from the right (s < 0) on the right."""
     limits = []
     for n, name in zip(chosen, ("first", "second"), strict=True):
         borders = np.concatenate([getattr(each, name)[[0, -1]] for each in pictures]) / (mm if n < 2 else 1.0)
@@ -358,14 +358,14 @@ def cell_corners(light_field: InMemory, across: str = "u") -> tuple[Array, Array
 
 
 def _slice(light_field: InMemory, row: int | None, pixel_row: int | None, across: str) -> InMemory:
-    """The light field with one row of views and one row of pixels left, in its place."""
+    """The light field reduced to one row of views and one row of pixels, at its place."""
     nv, nu, nt, ns = light_field.shape[:4]
     counts = {"row": nv, "pixel_row": nt} if across == "u" else {"row": nu, "pixel_row": ns}
     chosen = []
     for (name, count), given in zip(counts.items(), (row, pixel_row), strict=True):
         place = count // 2 if given is None else given
         if not -count <= place < count:
-            raise InputError(f"{name} is {place}, and there are {count} of them, counted from 0")
+            raise InputError(f"{name} is {place}, but there are {count}, counted from 0")
         chosen.append(slice(place % count, place % count + 1))
     if across == "u":
         return light_field[chosen[0], :, chosen[1], :]
@@ -379,12 +379,12 @@ def _radiance(piece: InMemory, across: str) -> Array:
 
 
 def _for_display(values: Array) -> Any:
-    """Linear light as screens want it, 0 to 1."""
+    """Linear light converted for display, 0 to 1."""
     return np.clip(from_linear(np.clip(values, 0, 1)), 0, 1)
 
 
 def _planes(camera: Train) -> list[tuple[float, str]]:
-    """The places behind elements and the sensor's, each with a title."""
+    """The planes behind elements and the sensor's plane, each with a title."""
     behind: dict[float, str] = {}
     for element in camera.elements:
         name = element.called

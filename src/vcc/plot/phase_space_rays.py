@@ -1,10 +1,10 @@
-"""A 2-D slice of a light field on its way through any camera: its rays traced, and where they are in phase space.
+"""Trace a 2-D slice of a light field through any camera, and image it in phase space.
 
-Behind lenslets, plates and prisms the cells of a light field are no longer parallelograms of one frame. Radiance
-stays what it was along each ray, so the slice is cut into many rays, each of which carries its cell's radiance
-through the same stages as pictures are made with, and at each plane they are laid into a raster of two of the four
-coordinates. A diffuser makes one ray many: there the raster is convolved with the kernel along the slope, and goes
-on as rays.
+Behind lenslets, plates and prisms, the cells of a light field are no longer parallelograms of one frame.
+Radiance is constant along each ray. Therefore the slice is divided into many rays, each with the radiance of
+its cell. They are traced through the same stages as captures, and at each plane they are collected in a
+raster of two of the four coordinates. A diffuser splits each ray into many: there the raster is convolved
+with the kernel along the slope and converted back to rays.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ Array = NDArray[np.float64]
 NAMES = "uvst"
 """The coordinates of a ray, in order."""
 RAYS = 1_000_000
-"""About so many are traced: some tens for each cell of the raster that they fill."""
+"""Approximate number of traced rays: some tens per filled cell of the raster."""
 RASTER = (400, 320)
-"""(columns, rows) of the pictures, and of what a diffuser's kernel is convolved with."""
+"""(columns, rows) of the images, and of the rasters convolved with a diffuser's kernel."""
 FULL = 0.75
-"""Cells of the raster with this share of the rays that fill them, or more, count as filled: rays lie on a lattice
-whose beat with the raster's is below the rest."""
+"""Cells of the raster with at least this share of their rays count as filled: the rays' lattice beats with
+the raster, with a smaller amplitude than the rest."""
 NEXT_TO_NOTHING = 1e-7
-"""Share of a cell that a diffuser's tails fill below which it counts as empty: above rounding, below all else."""
+"""Share of a cell filled by a diffuser's tails below which it counts as empty: just above rounding."""
 IN_ONE_PLANE = ((0, 2), (1, 3))
-"""Slices of a place and its own slope: of these optics keeps areas, and diffusers can be drawn."""
+"""Slices of a position and its own slope: optics preserve their areas, and diffusers can be drawn."""
 LARGEST_GRID = 2000
-"""Cells a side of a slice across coordinates that the samples' grid does not run along."""
+"""Largest number of cells per side for a slice whose coordinates are not those of the samples' grid."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -50,13 +50,13 @@ class PhaseSpacePicture(Brief):
     """A slice of a light field in two of its coordinates, at one plane.
 
     Args:
-        title: where.
+        title: description of the plane.
         z: of the plane, metres.
-        radiance: shape (rows, columns) or (rows, columns, 3): row 0 at the least value of the second coordinate,
-            column 0 of the first; 0 where nothing is.
-        filled: the share of each cell that rays fill, (rows, columns). Rays lie on a lattice, so that within the
-            slice it is 1 give or take some; of slices other than of a place and its slope, in which optics does
-            not keep areas, it is 1 where there are rays and else 0.
+        radiance: shape (rows, columns) or (rows, columns, 3): row 0 at the smallest value of the second
+            coordinate, column 0 at that of the first; 0 where there is no light field.
+        filled: the share of each cell that rays fill, (rows, columns). Rays are on a lattice, so that within
+            the slice it is only approximately 1. For slices other than of a position and its slope, whose
+            areas optics do not preserve, it is 1 where there are rays, otherwise 0.
         first: borders of the columns, (columns + 1,): metres for u and v, slopes for s and t.
         second: borders of the rows, (rows + 1,).
     """
@@ -78,16 +78,16 @@ class PhaseSpacePicture(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sheet(Brief):
-    """A 2-D slice at the entrance plane, in cells: the ray of place (a, b) is origin + a·first + b·second.
+    """A 2-D slice at the entrance plane, in cells: the ray at (a, b) is origin + a·first + b·second.
 
     Cell (n, m) reaches from (n, m) to (n + 1, m + 1).
 
     Args:
-        values: radiance of the cells, (n, m) or (n, m, 3); NaN where the light field holds nothing.
+        values: radiance of the cells, (n, m) or (n, m, 3); NaN where there is no light field.
         origin: the ray (u, v, s, t) of the corner of cell (0, 0).
         first: change of the ray from cell to cell along axis 0.
-        second: likewise along axis 1.
-        across: the two coordinates that are drawn, as indices of (u, v, s, t).
+        second: change of the ray from cell to cell along axis 1.
+        across: the two drawn coordinates, as indices of (u, v, s, t).
     """
 
     values: Array
@@ -103,21 +103,21 @@ class Sheet(Brief):
 
 
 def slice_of(across: str) -> tuple[int, int]:
-    """Which two coordinates are meant, as indices of (u, v, s, t); ``"u"`` is short for "us", ``"v"`` for "vt".
+    """Parse two coordinates into indices of (u, v, s, t); ``"u"`` is short for "us", ``"v"`` for "vt".
 
     Raises:
-        InputError: others, or one twice.
+        InputError: invalid coordinates, or one twice.
     """
     names = {"u": "us", "v": "vt"}.get(across, across)
     if not isinstance(names, str) or len(names) != 2 or names[0] == names[1] or set(names) - set(NAMES):  # type: ignore[redundant-expr]
         raise InputError(
-            f'across is "u" or "v", or two of u, v, s and t, such as "uv", that to the right first, not {across!r}'
+            f'across is "u" or "v", or two of u, v, s and t, such as "uv" (horizontal first), not {across!r}'
         )
     return NAMES.index(names[0]), NAMES.index(names[1])
 
 
 def sheet_of_samples(piece: InMemory, across: tuple[int, int]) -> Sheet:
-    """The sheet of a light field with one row of views and one row of pixels left: its own cells.
+    """The sheet of a light field reduced to one row of views and one row of pixels: its own cells.
 
     Args:
         piece: shape (1, views, 1, pixels) for u and s, (views, 1, pixels, 1) for v and t.
@@ -131,16 +131,16 @@ def sheet_of_samples(piece: InMemory, across: tuple[int, int]) -> Sheet:
 
 
 def sheet_of_rays(light_field: InMemory, across: tuple[int, int], fixed: tuple[float, float] | None) -> Sheet:
-    """The sheet of all rays with two coordinates held, interpolated linearly between samples.
+    """The sheet of all rays with two fixed coordinates, interpolated linearly between samples.
 
     Args:
         light_field: at the entrance plane.
         across: as in `Sheet`.
-        fixed: the other two coordinates, in the order u, v, s, t: metres and slopes; None takes those of the
-            light field's middle.
+        fixed: the other two coordinates, in the order u, v, s, t: metres and slopes; None uses the middle of the
+            light field.
 
     Raises:
-        InputError: not two finite numbers, or a slice that the light field does not hold anything of.
+        InputError: not two finite numbers, or a slice outside the light field.
     """
     from scipy.ndimage import map_coordinates
 
@@ -152,7 +152,7 @@ def sheet_of_rays(light_field: InMemory, across: tuple[int, int], fixed: tuple[f
     middle = light_field.frame((counts - 1) / 2)
     held = middle[others] if fixed is None else np.asarray(fixed, dtype=np.float64)
     if held.shape != (2,) or not np.isfinite(held).all():
-        raise InputError(f"fixed is two numbers, {NAMES[others[0]]} and {NAMES[others[1]]}, not {fixed}")
+        raise InputError(f"fixed must be two numbers, {NAMES[others[0]]} and {NAMES[others[1]]}, not {fixed}")
     origin, steps, sizes = middle.copy(), np.zeros((2, 4)), []
     origin[others] = held
     for n, axis in enumerate(across):
@@ -189,14 +189,14 @@ def sheet_of_rays(light_field: InMemory, across: tuple[int, int], fixed: tuple[f
 
 
 def radiance_of(values: NDArray[Any], light_field: InMemory) -> Array:
-    """Radiance of samples of a light field; of channels that are not three, of colour, the mean."""
+    """Radiance of samples of a light field; the mean over channels unless there are three (colour)."""
     radiance: Array = values.astype(np.float64) / light_field.grid.full_scale
     return radiance.mean(axis=-1) if light_field.grid.channels not in (None, 3) else radiance
 
 
 @dataclass
 class _Bundle:
-    """The rays of a sheet on their way: (n, 4), their radiance (n,) or (n, 3), the area of the sheet of each."""
+    """Traced rays of a sheet: (n, 4), their radiance (n,) or (n, 3), and the sheet's area per ray."""
 
     rays: Array
     radiance: Array
@@ -205,7 +205,7 @@ class _Bundle:
 
     @classmethod
     def of(cls, sheet: Sheet, count: int) -> _Bundle:
-        """Rays evenly over the sheet, those of cells that hold something."""
+        """Rays evenly over the sheet, without cells outside the light field."""
         sizes = sheet.values.shape[:2]
         total = [max(1, round(math.sqrt(count) / size)) * size for size in sizes]
         place = [(np.arange(n) + 0.5) / n * size for n, size in zip(total, sizes, strict=True)]
@@ -220,11 +220,11 @@ class _Bundle:
         return cls(rays, radiance, area, sheet.across)
 
     def move(self, affine: Affine) -> None:
-        """To another plane."""
+        """Move the rays to another plane."""
         self.rays = affine(self.rays)
 
     def meet(self, stage: Stage, count: int) -> None:
-        """What a stage absorbs, bends and scatters."""
+        """Absorb, bend and scatter the rays at a stage."""
         x, y = (self.rays[:, :2] - stage.element.decentre).T
         if stage.faces.pattern is not None:
             share = stage.faces.pattern(x, y)
@@ -237,10 +237,10 @@ class _Bundle:
             self._scatter(stage, stage.faces.spread, count)
 
     def laid_out(self, columns: int, rows: int, grow: float = 0.0) -> tuple[Array, Array, Array, Array]:
-        """(radiance, filled, borders of columns, borders of rows), the second coordinate grown by ``grow``."""
+        """(radiance, filled, borders of columns, borders of rows), the second coordinate extended by ``grow``."""
         places = self.rays[:, list(self.across)]
         low, high = places.min(axis=0), places.max(axis=0)
-        # What falls into one place gets a cell of its own width.
+        # If all rays coincide along an axis, use a cell of finite width.
         least = 1e-9 * np.maximum(np.abs(low), np.abs(high)) + 1e-12
         low, high = low - least - np.array([0, grow]), high + least + np.array([0, grow])
         cell = (high - low) / (columns, rows)
@@ -251,7 +251,7 @@ class _Bundle:
         sums = [np.bincount(flat, channel, columns * rows) for channel in channels]
         mean = np.stack(sums, axis=-1) / np.maximum(count, 1)[:, None]
         filled = np.asarray(count * (self.area / float(np.prod(cell))), dtype=np.float64)
-        if self.across not in IN_ONE_PLANE:  # areas may shrink and grow
+        if self.across not in IN_ONE_PLANE:  # areas are not preserved
             filled = (count > 0).astype(np.float64)
         radiance = mean.reshape(rows, columns, -1)
         return (
@@ -262,10 +262,10 @@ class _Bundle:
         )
 
     def _scatter(self, stage: Stage, scatter: Scatter, count: int) -> None:
-        """Convolve along the slope, and go on with the raster as a sheet of cells.
+        """Convolve the raster along the slope, and convert it to a sheet of cells again.
 
-        What the kernel does along the other slope leads out of the slice; as much comes in from slices beside it
-        where these are alike, which is taken to be so.
+        The kernel along the other slope moves light out of the slice. Neighbouring slices are assumed to be
+        equal, so that the same amount comes in.
         """
         if self.across not in IN_ONE_PLANE:
             names = "".join(NAMES[n] for n in self.across)
@@ -283,7 +283,7 @@ class _Bundle:
         at = np.zeros((columns, 2))
         at[:, position], at[:, 1 - position] = (first[1:] + first[:-1]) / 2, held[:, 0]
         at -= stage.element.decentre
-        # Even where rays' lattice and the raster beat, and still as much as there was in all.
+        # Removes the beat of the rays' lattice with the raster, and preserves the total.
         even = np.minimum(filled / FULL, 1.0)
         dim = values if values.ndim == 2 else values.mean(axis=2)
         weight = dim if dim.any() else np.ones_like(dim)
@@ -309,9 +309,9 @@ class _Bundle:
 
 
 def _along_slope(light: Array, scatter: Scatter, axis: int, places: Array, step: float) -> Array:
-    """A raster (slopes, places, channels) convolved along its slopes by the kernels at the places (n, 2).
+    """A raster (slopes, places, channels) convolved along its slopes by the kernels at positions (n, 2).
 
-    A kernel's light is shared by the two cells around each of its points, as its mean asks.
+    The light of each kernel point is shared by the two cells around it, so that its mean is exact.
     """
     slopes, shares, widths = marginals(scatter, axis, places[:, 0], places[:, 1])
     reach = math.ceil(scatter.reach[axis] / step) + 1
@@ -332,18 +332,18 @@ def _along_slope(light: Array, scatter: Scatter, axis: int, places: Array, step:
 def traced(
     camera: Train, sheet: Sheet, titles: dict[float, str], *, rays: int = RAYS, raster: tuple[int, int] = RASTER
 ) -> Iterator[PhaseSpacePicture]:
-    """The pictures of a sheet at the entrance, behind each plane of elements and on the sensor.
+    """The images of a sheet at the entrance, behind each plane of elements and on the sensor.
 
     Args:
         camera: any.
         sheet: at the entrance plane.
-        titles: of the planes that are wanted, by z in metres: where elements end, and the sensor's; −1 for the
+        titles: of the wanted planes, by z in metres: the ends of elements, and the sensor's; −1 for the
             entrance, before all elements.
-        rays: about how many are traced.
-        raster: (columns, rows) of the pictures.
+        rays: approximate number of traced rays.
+        raster: (columns, rows) of the images.
 
     Raises:
-        InputError: a diffuser across a slice that is not of a place and its slope, or what elements refuse.
+        InputError: a diffuser for a slice that is not of a position and its slope, or an error of an element.
     """
     bundle = _Bundle.of(sheet, rays)
 

@@ -1,4 +1,4 @@
-"""Sampling advice drawn: disparity and blur over distance, and all lengths side by side."""
+"""Plot sampling advice: disparity and blur over distance, and bars of all lengths."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LEAST_SHOWN = 0.05
-"""Pixels: the logarithmic axis of gaps ends here, near focus."""
+"""Lower end of the logarithmic axis of gaps, near focus, pixels."""
 FREE = "#CFE9DE"
 """A pale `style.GREEN`: the range of distances without ghosts."""
 BEYOND = 3.0
-"""The distances drawn go on beyond the scene by this factor, each way."""
+"""Factor by which the drawn distances extend beyond the scene, on both sides."""
 
 
 def plot_sampling(advice: SamplingLimits) -> Figure:
     """Draw disparity and blur over distance, the range free of ghosts shaded, and bars of lengths.
 
-    Bars that keep to their limits are blue, others orange; each limit is a line across its bar. Where disparity is
-    not given (behind a lens array, say) the bars are all there is.
+    Bars within their limits are blue, others orange; each limit is a line across its bar. If disparity is not
+    available (for example behind a lens array), only the bars are drawn.
 
     Args:
-        advice: of a camera and a light field, as of `vcc.analysis.sampling_advice`.
+        advice: for a camera and a light field, as from `vcc.analysis.sampling_advice`.
 
     Returns:
         The figure; ``.savefig(path)`` writes it to a file.
@@ -89,12 +89,12 @@ def _draw_gaps(axes: Axes, advice: SamplingLimits) -> None:
 
 
 def _shown(advice: SamplingLimits) -> tuple[float, float]:
-    """From where to where distances are drawn, metres."""
+    """The range of drawn distances, metres."""
     known = [*(advice.depths or ()), *(advice.free_of_ghosts or ())]
     known += [] if advice.focus_distance is None else [advice.focus_distance]
     finite = [distance for distance in known if math.isfinite(distance) and distance > 0] or [1.0]
     low, high = min(finite), max(finite)
-    # What is far away, or infinite, has the disparity of ten times the farthest finite distance, about.
+    # Distant or infinite points have about the disparity of ten times the farthest finite distance.
     return low / BEYOND, high * (10.0 if any(distance > high for distance in known) else BEYOND)
 
 
@@ -130,12 +130,12 @@ def _draw_lengths(axes: Axes, advice: SamplingLimits) -> None:
 
 
 def _legend_below(axes: Axes) -> None:
-    """Where it covers nothing."""
+    """A legend below the axes, where it covers nothing."""
     axes.legend(fontsize=style.SMALL, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3, frameon=False)
 
 
 def _plain_ticks(axis: Any) -> None:
-    """Numbers as people write them, not as powers of ten."""
+    """Ticks as plain numbers, not as powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()

@@ -1,4 +1,4 @@
-"""What all pictures share: size of type, a palette that colour-blind readers tell apart, new axes."""
+"""Shared style of all drawings: font sizes, a palette for colour-blind readers, new axes."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
-"""Of the palette of Okabe and Ito (2008), which people with any colour vision tell apart."""
+"""From the palette of Okabe and Ito (2008), which people with any colour vision can distinguish."""
 GLASS, GLASS_EDGE = "#CFE6F5", "#4A7A9C"
 FROST, FROST_EDGE = "#F1F1EC", "#8A8A80"
 INK, QUIET = "#222222", "#777777"
 NOTHING = "#DDDDDD"
-"""Where a light field holds no samples: neither black nor white."""
+"""Colour of areas without samples: neither black nor white."""
 
 TITLE, TEXT, SMALL = 12, 11, 10
-"""Points; readable at 100 dots per inch."""
+"""Font sizes in points; readable at 100 dots per inch."""
 
 
 def frost_tones() -> Any:
-    """A colour map for ground glass, from hardly rough (0) to as rough as it gets (1)."""
+    """A colour map for ground glass, from almost smooth (0) to roughest (1)."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("frost", ["#FDFDFA", "#A9A99C"])
 
 
 def black_tones() -> Any:
-    """A colour map from opaque black (0) to nothing at all (1), for what stops light on something else."""
+    """A colour map from opaque black (0) to transparent (1), for opaque parts on top of other objects."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("black", [(0.1, 0.1, 0.1, 1.0), (0.1, 0.1, 0.1, 0.0)])
@@ -42,7 +42,7 @@ _by_itself: ContextVar[bool] = ContextVar("figures that pyplot does not know of"
 
 @contextmanager
 def by_itself() -> Iterator[None]:
-    """New figures within belong to the caller alone, in notebooks, too: they do not show themselves."""
+    """New figures in this context do not use pyplot, even in notebooks: they do not show themselves."""
     before = _by_itself.set(True)
     try:
         yield
@@ -53,15 +53,15 @@ def by_itself() -> Iterator[None]:
 def new_axes(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:
     """Axes on a new figure.
 
-    Where someone uses pyplot, and in notebooks, the figure is one of pyplot's, so that it shows itself and
-    ``plt.show()`` knows it; elsewhere no global state knows of it, and nothing piles up.
+    If pyplot is in use, and in notebooks, the figure belongs to pyplot, so that it shows itself and ``plt.show()``
+    includes it. Otherwise no global state refers to it, so that its memory is freed.
 
     Args:
         width: of the figure, inches.
-        height: inches.
+        height: of the figure, inches.
         rows: of axes.
         columns: of axes.
-        options: as `matplotlib.figure.Figure.subplots` takes them.
+        options: of `matplotlib.figure.Figure.subplots`.
 
     Returns:
         Axes, or a (rows, columns) array of them if ``squeeze=False`` is given.
@@ -84,7 +84,7 @@ def _in_notebook() -> bool:
 
 
 def tidy(axes: Axes, horizontal: str, vertical: str) -> None:
-    """Label the axes, and take away what carries no information."""
+    """Label the axes, and remove the spines without information."""
     axes.set_xlabel(horizontal, fontsize=TEXT, color=INK)
     axes.set_ylabel(vertical, fontsize=TEXT, color=INK)
     axes.tick_params(labelsize=SMALL, colors=INK)

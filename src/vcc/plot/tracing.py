@@ -1,4 +1,4 @@
-"""Single rays through a camera, for drawing: where they go, how they split, and where they end."""
+"""Trace single rays through a camera, for drawing: their paths, how they split, and where they end."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from vcc.shapes.kernels import Kernel
 Array = NDArray[np.float64]
 
 BRANCHES = (1 / 6, 1 / 2, 5 / 6)
-"""A ray that is scattered goes on as three, at these quantiles of the kernel, each for a third of the light.
-Of a Gaussian they are its middle and ±0.97 σ; of two spots they are the spots, not the dark between them."""
+"""A scattered ray splits into three, at these quantiles of the kernel, each with a third of the light. For a
+Gaussian they are its centre and ±0.97 σ; for two spots they are the spots, not the dark gap."""
 MOST_RAYS = 1500
-"""Rays are not split into more than this: beyond, each goes on by one of its branches, in turns."""
+"""Rays are not split into more than this: beyond it, each ray continues as one of its branches, alternately."""
 BINS = 257
-"""Into which the reach of a kernel is divided to find its quantiles."""
+"""Number of bins over the reach of a kernel, to find its quantiles."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Paths(Brief):
-    """Where rays cross planes, and what is left of them.
+    """Positions of rays at planes, and their remaining light.
 
     Args:
         z: of each plane, metres: (planes,). The last one is the sensor's.
         positions: (x, y) of each ray at each plane, metres: (rays, planes, 2).
-        shares: what is left of each ray on arrival at each plane, 0 to 1: (rays, planes).
-        starts: the plane from which on each ray is one of its own, (rays,): 0, or that of the diffuser at which
-            it branched off. Before, it is the ray that it branched off from.
+        shares: remaining light of each ray on arrival at each plane, 0 to 1: (rays, planes).
+        starts: the plane at which each ray begins, (rays,): 0, or that of the diffuser at which it branched off.
+            Before that, it coincides with the ray from which it branched off.
     """
 
     z: Array
@@ -49,11 +49,12 @@ class Crossing:
     """A plane of an element that light crosses.
 
     Args:
-        z: of the plane, metres. Of what is inside a thick element only a map of rays is known: it is drawn where
-            a ray through the middle of the entrance would have got so far by free flight.
-        step: rays from the crossing before, or from just before the element, to here; centred on the element.
-        from_entrance: rays from just before the element to here, likewise.
-        faces: what stands there.
+        z: of the plane, metres. Inside a thick element only a map of rays is known: z is then where a ray
+            through the centre of the entrance would be after free propagation.
+        step: map of rays from the crossing before, or from just before the element, to here; centred on the
+            element.
+        from_entrance: map of rays from just before the element to here; centred on the element.
+        faces: of the plane.
     """
 
     z: float
@@ -63,7 +64,7 @@ class Crossing:
 
 
 def crossings(element: Element) -> list[Crossing]:
-    """The planes of an element in order: one of a thin one; of a thick one its entrance, all faces, its exit."""
+    """The planes of an element in order: one of a thin element; entrance, all faces and exit of a thick one."""
     parts = element.parts()
     steps_ahead = sum(isinstance(part, Affine) for part in parts)
     end = element.z + element.length
@@ -86,17 +87,17 @@ def crossings(element: Element) -> list[Crossing]:
 
 
 def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int | None = None) -> Paths:
-    """The paths of rays from a plane before the camera through its elements to the sensor.
+    """Trace rays from a plane before the camera through its elements to the sensor.
 
     Args:
-        camera: whose elements bend, absorb and scatter.
+        camera: with elements that bend, absorb and scatter.
         rays: (u, v, s, t) of each ray at the entrance plane z = 0: (rays, 4), metres and slopes.
-        start: where to start drawing, metres, 0 or less.
+        start: start of the drawing, metres, 0 or less.
         split_along: the axis, 0 for x and 1 for y, along which scattered rays split into three (`BRANCHES`);
-            None lets diffusers pass rays unscattered.
+            None ignores scattering.
 
     Raises:
-        InputError: an element that returns what it must not.
+        InputError: an element with an invalid result.
     """
     given = np.asarray(rays, dtype=np.float64)
     bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [])
@@ -118,7 +119,7 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
 
 @dataclass
 class _Bundle:
-    """Rays on their way, and what is known of them so far: one entry of the lists a plane."""
+    """Rays during tracing; the lists have one entry per plane so far."""
 
     rays: Array
     share: Array
@@ -128,7 +129,7 @@ class _Bundle:
     shares: list[Array]
 
     def cross(self, z: float, positions: Array) -> None:
-        """Note that the rays arrive at a plane."""
+        """Record the arrival of the rays at a plane."""
         self.z.append(z)
         self.positions.append(positions)
         self.shares.append(self.share)
@@ -147,7 +148,7 @@ class _Bundle:
             self.split(scattered, split_along)
 
     def split(self, slopes: Array, axis: int) -> None:
-        """Let each ray go on as several, of these changes of slope, (rays, branches)."""
+        """Split each ray by these changes of slope, (rays, branches)."""
         count, branch = slopes.shape
         middle = branch // 2
         if count * branch > MOST_RAYS:
@@ -159,30 +160,30 @@ class _Bundle:
         self.rays[:, 2 + axis] += slopes.ravel()
         self.positions = [positions[parent] for positions in self.positions]
         self.shares = [shares[parent] for shares in self.shares]
-        # The middle one is drawn as the ray that was there before.
+        # The middle branch continues the original ray.
         own = np.arange(count * branch) % branch == middle
         self.starts = np.where(own, self.starts[parent], len(self.z) - 1)
 
 
 def branches(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
-    """Changes of slope along an axis at the quantiles `BRANCHES` of the kernels at places x, y: (places, 3)."""
+    """Changes of slope along an axis at the quantiles `BRANCHES` of the kernels at positions x, y: (places, 3)."""
     slopes, shares, widths = marginals(scatter, axis, x, y)
     order = np.argsort(slopes)
     running = np.cumsum(shares[:, order], axis=1)
-    # The first that reaches the share: never between two spots, where there is no light.
+    # The first slope that reaches the share: never between two spots, where there is no light.
     picked = [np.argmax(running >= share * running[:, -1:], axis=1) for share in BRANCHES]
     return np.asarray(slopes[order][np.stack(picked, axis=-1)] * widths[:, None])
 
 
 def spread_along(scatter: Scatter, axis: int, x: Array, y: Array) -> Array:
-    """The standard deviation of the change of slope along an axis at places x, y: (places,)."""
+    """The standard deviation of the change of slope along an axis at positions x, y: (places,)."""
     slopes, shares, widths = marginals(scatter, axis, x, y)
     mean = shares @ slopes
     return np.asarray(widths * np.sqrt(np.maximum(shares @ slopes**2 - mean**2, 0.0)))
 
 
 def marginals(scatter: Scatter, axis: int, x: Array, y: Array) -> tuple[Array, Array, Array]:
-    """Changes of slope (n,) of all kernels, their shares at each place (places, n), and the widths (places,)."""
+    """Changes of slope (n,) of all kernels, their shares (places, n) at each position, and widths (places,)."""
     mix, widths = scatter.at(x, y)
     single = [_marginal(kernel, axis) for kernel in scatter.kernels]
     shares = np.concatenate([mix[:, n, None] * share for n, (_, share) in enumerate(single)], axis=1)
@@ -190,7 +191,7 @@ def marginals(scatter: Scatter, axis: int, x: Array, y: Array) -> tuple[Array, A
 
 
 def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:
-    """A kernel's distribution along one axis: changes of slope, and the share of light at each."""
+    """A kernel's distribution along one axis: changes of slope, and the share of light of each."""
     slopes, shares = kernel.quadrature()
     slopes, reach = slopes[:, axis], kernel.reach[axis]
     places = (slopes / reach + 1) / 2 * BINS if reach > 0 else 0 * slopes
@@ -201,7 +202,7 @@ def _marginal(kernel: Kernel, axis: int) -> tuple[Array, Array]:
 
 
 def openings(camera: Train, axis: int) -> Iterator[tuple[Element, Affine, float]]:
-    """What is opaque around an opening of known size.
+    """The openings of known size with opaque surroundings.
 
     Yields:
         The element, the map of rays from the entrance plane to the opening (through all that is affine), and
@@ -213,14 +214,14 @@ def openings(camera: Train, axis: int) -> Iterator[tuple[Element, Affine, float]
 
 
 def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: float = 0.0) -> Array:
-    """Rays from a point of the scene through places on the entrance plane.
+    """Rays from a point of the scene through positions on the entrance plane.
 
     Args:
-        positions: places along the drawn axis, metres.
+        positions: along the drawn axis, metres.
         distance: of the point from the entrance plane, metres; infinite for parallel light.
         offset: of the point from the axis as a slope, X/Z.
         axis: 0 for x, 1 for y.
-        cross: place along the other axis, metres.
+        cross: position along the other axis, metres.
 
     Returns:
         (u, v, s, t) of each ray at z = 0, (rays, 4).

@@ -205,9 +205,7 @@ def _checked_psf(psf: ArrayLike, shape: tuple[int, int], layered: bool) -> Array
             bad = tuple(int(n) for n in np.argwhere(~np.isfinite(each))[0])
             raise InputError(f"{name} has {each[bad]} at index {bad}: it must be finite")
         if each.min() < -SUM_TOLERANCE:
-            raise InputError(
-                f"{name} is negative ({each.min():.6g}): light does not spread so. Clip and normalise it"
-            )
+            raise InputError(f"{name} is negative ({each.min():.6g}), but light is not: clip and normalise it")
         if abs(each.sum() - 1) > SUM_TOLERANCE:
             raise InputError(
                 f"{name} sums to {each.sum():.9g}, not to 1: divide it by its sum (or, where light is lost, "

@@ -207,7 +207,7 @@ def richardson_lucy(
     values = numbers_of(recording, "the recording")
     if values.min() < 0:
         raise InputError(
-            f"Richardson–Lucy is for light, which is not negative: the recording goes down to "
+            f"Richardson–Lucy needs light, which is not negative, but the recording goes down to "
             f"{values.min():.6g}. Clip it (numpy.maximum(recording, 0)), or use wiener or sparse_gradients"
         )
     _check_steps(iterations, tolerance)
@@ -422,11 +422,11 @@ def _check_noise(noise: float, above: bool) -> None:
     if not (math.isfinite(noise) and (noise > 0 if above else noise >= 0)):
         raise InputError(
             f"the noise is a standard deviation {'above 0' if above else 'of 0 or more'}, in the recording's "
-            f"unit, not {noise}" + (": it is what weighs the recording against the prior" if above else "")
+            f"unit, not {noise}" + (": it weights the recording against the prior" if above else "")
         )
 
 
 def _check_steps(iterations: int, tolerance: float) -> None:
     checks.whole_number_between("iterations", iterations, 1)
     if not tolerance >= 0:
-        raise InputError(f"the tolerance is 0 or more, not {tolerance}")
+        raise InputError(f"the tolerance must be 0 or more, not {tolerance}")

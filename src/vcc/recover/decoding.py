@@ -193,7 +193,7 @@ def _check_affine(camera: Camera, array: LensArray) -> None:
         if stage.faces.bending is not None or stage.faces.scatter is not None:
             raise InputError(
                 f"decoding needs lenses, prisms and masks only before the lenslets, and {stage.element.label} "
-                "bends or scatters light in another way: what a pixel saw is not known from its place"
+                "bends or scatters light in another way, so that the rays of a pixel are unknown"
             )
 
 

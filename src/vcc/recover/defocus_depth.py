@@ -93,8 +93,8 @@ class DefocusDepth(Brief, Shown):
         """
         if not (cost > 0 and 0 < outliers < 1 and sweeps >= 1):
             raise InputError(
-                f"cost is greater than 0, outliers between 0 and 1 and sweeps 1 or more, not {cost}, {outliers} "
-                f"and {sweeps}"
+                f"cost must be greater than 0, outliers between 0 and 1 and sweeps 1 or more, not {cost}, "
+                f"{outliers} and {sweeps}"
             )
         count = len(self.log_likelihood)
         step = float(np.diff(self.rows).min() if len(self.rows) > 1 else self.block / 2)
@@ -124,7 +124,7 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
     """
     away = [float(distance) for distance in distances]
     if not away or not all(distance > 0 for distance in away):
-        raise InputError(f"distances are one or more, in metres, greater than 0, not {list(distances)}")
+        raise InputError(f"distances must be one or more, in metres, greater than 0, not {list(distances)}")
     aperture = _opening(camera) if aperture is None else aperture
     checks.above_zero("aperture", aperture, unit="m")
     ray = camera.rays_at(camera.sensor.z).linear
@@ -267,15 +267,15 @@ def _warn_of_ends(found: Array, confidence: Array, distances: tuple[float, ...])
             if share > 0
         )
         warn_of_result(
-            f"of the blocks, by confidence, {which} of the candidates explains best: they may lie beyond, where "
-            "nothing was tried. Add a candidate beyond, to tell"
+            f"of the blocks, by confidence, {which} of the candidates fits best: their depth may be beyond it. "
+            "Add a candidate beyond it to check"
         )
 
 
 def _block_starts(shape: tuple[int, ...], kernels: list[Array], block: int, step: int) -> list[NDArray[np.intp]]:
     """The first rows and the first columns of blocks."""
     if not (block >= 4 and step >= 1):
-        raise InputError(f"block is 4 pixels or more and step 1 or more, not {block} and {step}")
+        raise InputError(f"block must be 4 pixels or more and step 1 or more, not {block} and {step}")
     largest = max(max(kernel.shape) for kernel in kernels)
     if largest > block:
         raise InputError(
@@ -343,15 +343,15 @@ def _opening(camera: Camera) -> float:
 def _crosses(low: float, high: float, focus: float) -> str:
     return (
         f"candidates from {low:g} to {high:g} m cross the focal plane at about {focus:g} m: a blur there has two "
-        "distances, one on each side, and this method cannot tell which. Give candidates on one side of it"
+        "distances, one on each side, and this method cannot distinguish them. Pass candidates on one side of it"
     )
 
 
 def _check_candidates(kernels: list[Array], distances: Sequence[float], shape: tuple[int, ...]) -> None:
     if len(kernels) != len(distances) or len(kernels) < 2:
         raise InputError(
-            f"two candidates or more, each with a kernel and a distance, not {len(kernels)} kernels and "
-            f"{len(distances)} distances"
+            f"two candidates or more are needed, each with a kernel and a distance, not {len(kernels)} kernels "
+            f"and {len(distances)} distances"
         )
     for kernel, distance in zip(kernels, distances, strict=True):
         if kernel.ndim != 2 or not np.isfinite(kernel).all() or abs(kernel.sum() - 1) > 1e-3:

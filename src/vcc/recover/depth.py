@@ -127,7 +127,7 @@ def disparity_error(
         raise InputError(f"no pixel is left to compare in maps of shape {found.shape} with a border of {border}")
     if not np.isfinite(difference).all():
         raise InputError(
-            "disparities and true ones must be finite where they are compared: leave others out by where"
+            "disparities and ground truth must be finite where they are compared: exclude other pixels with where="
         )
     return DisparityError(
         float(np.mean(np.abs(difference) > threshold)),
@@ -274,8 +274,8 @@ def _warn(grid: Grid, ends: tuple[float, float], ended: list[float], beyond: flo
             if share > 0
         )
         said.append(
-            f"the search ended {where}: they lie beyond what was searched, or have no texture, and their distance "
-            "is NaN. A wider disparity_range=(lowest, highest), pixels per view, tells which"
+            f"the search ended {where}: they are outside the range, or have no texture, and their distance "
+            "is NaN. Try a wider disparity_range=(lowest, highest), pixels per view"
         )
     if beyond >= MANY_ENDED:
         said.append(

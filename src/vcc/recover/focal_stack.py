@@ -111,7 +111,7 @@ class FocalStack(Brief, Shown):
 
         checks.above_zero("the window", window, unit="pixels")
         if not selectivity >= 0:
-            raise InputError(f"the selectivity is 0 or more, not {selectivity}")
+            raise InputError(f"the selectivity must be 0 or more, not {selectivity}")
         count, rows, columns = self.pictures.shape[:3]
         needed = 3 * 8 * count * rows * columns + 2 * self.pictures[0].size * 8
         check_memory(needed, memory_limit, "an all-in-focus picture", "take fewer distances or smaller views")
@@ -206,7 +206,7 @@ def focus_distances(nearest: float, farthest: float, count: int) -> tuple[float,
             f"the nearest distance, {nearest} m, lies beyond the farthest, {farthest} m: exchange them"
         )
     if int(count) != count or count < 1:
-        raise InputError(f"a focal stack has a whole number of pictures, 1 or more, not {count}")
+        raise InputError(f"the number of images of a focal stack must be an integer, 1 or more, not {count}")
     vergences = (
         np.linspace(1 / nearest, 1 / farthest, int(count)) if count > 1 else [(1 / nearest + 1 / farthest) / 2]
     )

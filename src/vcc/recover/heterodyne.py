@@ -177,8 +177,8 @@ def _checked(picture: Any, camera: Camera, what: str) -> Array:
     rows, columns = camera.sensor.shape
     if values.shape[:2] != (rows, columns):
         raise InputError(
-            f"{what} has the shape {values.shape}, and the camera's sensor {rows}×{columns} pixels: carriers "
-            "would be looked for in the wrong place. Give the whole recording, or the camera that made it"
+            f"{what} has the shape {values.shape}, but the camera's sensor has {rows}×{columns} pixels: pass the "
+            "whole recording, or the camera that made it"
         )
     return values
 

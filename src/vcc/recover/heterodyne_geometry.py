@@ -225,8 +225,8 @@ def _scales(at_mask: Affine, at_sensor: Affine, mask: str) -> list[tuple[float, 
         a_s, b_s = at_sensor.matrix[axis, axis], at_sensor.matrix[axis, axis + 2]
         if abs(b_s) < 1e-12:
             raise InputError(
-                "the sensor lies where the entrance plane is imaged: each pixel sees one view only, and there is "
-                "nothing to tell apart"
+                "the sensor lies where the entrance plane is imaged: each pixel sees one view only, so that "
+                "views cannot be decoded"
             )
         scales.append((b_m / b_s, a_m - b_m * a_s / b_s))
     if min(abs(gamma) for gamma, _ in scales) < 1e-9:

@@ -100,13 +100,13 @@ def without_aberration(light_field: LightField, surface: Surface) -> LightField:
     from scipy.ndimage import shift
 
     if not isinstance(light_field, LightField):
-        raise InputError("an aberration is taken out of samples in memory: pass stored.read(), or a part of it")
+        raise InputError("an aberration is corrected for samples in memory: pass stored.read(), or a part of it")
     linear = light_field.frame.linear
     steps = np.array([linear[3, 3], linear[2, 2]])  # of a row and of a column
     if not steps.all() or max(abs(linear[2, 3]), abs(linear[3, 2])) > _TURNED * np.abs(steps).min():
         raise InputError(
-            "the pixels of this light field do not lie along the slopes s and t: take the aberration out where it "
-            "was decoded, before other optics"
+            "the pixels of this light field do not lie along the slopes s and t: correct the aberration "
+            "right after decoding, before other optics"
         )
     values = np.array(to_numpy(light_field.values), dtype=np.float32)
     nv, nu, nt, ns = values.shape[:4]

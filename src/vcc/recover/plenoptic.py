@@ -208,8 +208,8 @@ def _chosen_grid(
             return own if inverted else own.turned(camera.sensor.shape)
         else:
             raise InputError(
-                "where the micro-images are is not known: give white= (a recording of something white), camera= "
-                "or a LensletGrid"
+                "the positions of the micro-images are unknown: pass white= (a recording of a white scene), "
+                "camera= or a LensletGrid"
             )
     if camera is not None:
         expected = LensletGrid.of_camera(camera)

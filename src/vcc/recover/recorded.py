@@ -37,7 +37,7 @@ def numbers_of(picture: Image | Recording | ArrayLike, what: str) -> Array:
         first = tuple(int(n) for n in np.argwhere(~finite)[0])
         raise InputError(
             f"{what} holds {np.count_nonzero(~finite)} numbers that are not finite, the first ({values[first]}) "
-            f"at index {first}: mend such pixels first, or give a part without them"
+            f"at index {first}: replace such pixels, or pass a part without them"
         )
     return values
 

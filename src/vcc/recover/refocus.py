@@ -144,7 +144,7 @@ def refocused(
     most = float(covered.max())
     if not most > 0:
         raise InputError(
-            f"an aperture of {diameter} m around {centre} m lies beside all views: the picture would be black"
+            f"an aperture of {diameter} m around {centre} m is outside all views: the image would be black"
         )
     seen = covered > _UNSEEN * most
     if not seen.all():
@@ -322,8 +322,8 @@ def _sweep(light_field: LightField) -> NDArray[np.float64]:
     found = light_field.measured_disparity_range()
     if found is None:
         raise InputError(
-            "how far the scene is away cannot be measured from this light field (too few views, or no texture): "
-            "give scene_distance="
+            "the distance of the scene cannot be estimated from this light field (too few views, or no texture): "
+            "pass scene_distance="
         )
     ends = np.array([1 / light_field.distance_of(each) for each in found])
     linear = light_field.frame.linear

@@ -75,13 +75,13 @@ class BiprismStereo:
         if not self.deflection > 0:
             raise InputError(
                 f"the biprism bends by {self.deflection:g}: only with a deflection greater than 0, towards the "
-                "ridge, do both halves see the same things"
+                "ridge, do both halves see the same objects"
             )
         if not (self.ahead > 0 and self.behind > 0):
             raise InputError(
                 f"the biprism stands {self.ahead * 1e3:g} mm before the lens, and the sensor "
                 f"{self.behind * 1e3:g} mm behind it: both must be greater than 0. "
-                "With no way between biprism and lens there is no baseline"
+                "Without a distance between biprism and lens there is no baseline"
             )
 
     @classmethod
@@ -164,8 +164,8 @@ def depth_by_biprism(
     ended = (found & at_end).mean(dtype=np.float64)
     if ended >= MANY_ENDED:
         warn_of_result(
-            f"{ended:.1%} of the blocks match best at an end of distance_range: they lie beyond it, or have no "
-            "texture, and their distance is NaN. A wider range tells which"
+            f"{ended:.1%} of the blocks match best at an end of distance_range: they are outside it, or have no "
+            "texture, and their distance is NaN. Try a wider range"
         )
     distance = np.array(
         [
@@ -216,7 +216,9 @@ def _mixed(stereo: BiprismStereo, lens: Lens) -> float:
     signs occur if |x| is less than the result.
     """
     if lens.diameter is None:
-        raise InputError(f"{lens.label} has no diameter: then light of both halves of the biprism is everywhere")
+        raise InputError(
+            f"{lens.label} has no diameter, so that light of both halves mixes everywhere: give it one"
+        )
     a, d = stereo.ahead, stereo.behind
     return abs(1 + a / d - a / lens.focal_length) * lens.diameter / 2 * d / a
 

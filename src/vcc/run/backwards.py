@@ -172,10 +172,10 @@ class Backwards:
         weights = np.asarray(picture_weights, dtype=np.float64)
         channels = self.drive.samples.grid.shape[4:]
         if weights.shape != (shape := (*self.plan.sensor_shape, *channels)):
-            raise InputError(f"weights of the shape {weights.shape} are not for a picture of the shape {shape}")
+            raise InputError(f"weights have the shape {weights.shape}, but the image has the shape {shape}")
         if not np.isfinite(weights).all():
             place = tuple(int(n) for n in np.argwhere(~np.isfinite(weights))[0])
-            raise InputError(f"weights of a picture are finite numbers; at {place} there is {weights[place]}")
+            raise InputError(f"weights of an image must be finite; at {place} there is {weights[place]}")
         return weights if channels else weights[..., None]
 
     # --- blocks ---
@@ -216,7 +216,7 @@ class Backwards:
         needed = math.prod(shape) * self._kind.itemsize
         if not self.drive.in_memory and needed > self.drive.limit:
             raise InputError(
-                f"what a picture says of all samples takes {math.ceil(needed / 1e6)} MB, and memory_limit is "
+                f"the gradient of all samples takes {math.ceil(needed / 1e6)} MB, and memory_limit is "
                 f"{math.ceil(self.drive.limit / 1e6)} MB: pass a larger one, or an array on disk to an operator's "
                 "adjoint, op.T(picture, out=numpy.lib.format.open_memmap('back.npy', 'w+', op.dtype, "
                 "op.samples_shape))"
@@ -244,7 +244,7 @@ class Backwards:
         """Each block and its gradient, in order, computed by workers; `AHEAD` limits how many wait."""
         drive, blocks = self.drive, self._blocks
         assert drive.worker_pool is not None
-        assert not self._reads, "others are asked about samples alone"
+        assert not self._reads, "workers compute gradients of samples only"
         work, each = (
             Work(_share_of, PortableBack(drive.portable, raster), first=_begun),
             AHEAD * max(drive.worker_pool.places, 1),

@@ -180,8 +180,8 @@ def cut(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks
         return of(1, 1, min(pixel_rows_each, nt))
     least = need.fixed + pixel_row
     raise InputError(
-        f"memory_limit={math.ceil(limit)} bytes is too little: this picture takes {math.ceil(least / 1e6)} MB "
-        f"however small the blocks are, and about {math.ceil(need.least_for_views / 1e6)} MB to go well"
+        f"memory_limit={math.ceil(limit)} bytes is too little: this image needs {math.ceil(least / 1e6)} MB "
+        f"even with the smallest blocks, and about {math.ceil(need.least_for_views / 1e6)} MB to be efficient"
     )
 
 

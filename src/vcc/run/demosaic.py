@@ -39,7 +39,7 @@ def demosaic(
     tile = (len(electronics.tile), len(electronics.tile[0]))
     if any(size < least for size, least in zip(mosaic.shape, tile, strict=True)):
         raise InputError(
-            f"a sensor of {mosaic.shape[0]}×{mosaic.shape[1]} pixels does not hold a whole tile of "
+            f"a sensor of {mosaic.shape[0]}×{mosaic.shape[1]} pixels is smaller than a tile of "
             f"its colour filter ({tile[0]}×{tile[1]})"
         )
     if chosen == "bilinear":
@@ -47,7 +47,7 @@ def demosaic(
     if electronics.is_bayer:
         return np.asarray(_by_library(chosen, mosaic, electronics.bayer_name), dtype=np.float32)
     raise InputError(
-        f'demosaicing by "{chosen}" is made for RGGB and its shifts, and this filter is '
+        f'demosaicing by "{chosen}" supports RGGB and its shifts only, and this filter is '
         f'{electronics.filter_in_words}: use method="bilinear"'
     )
 

@@ -156,12 +156,12 @@ class Drive:
         """
         if how.tolerance is not None:
             raise InputError(
-                "tolerance takes more rays until one picture is good enough, and backwards each picture takes the "
-                "same rays: leave it out, and pass samples= to camera.compile or camera.operator"
+                "tolerance adds rays until an image is accurate enough, but an operator needs the same rays for "
+                "each image: leave it out, and pass samples= to camera.compile or camera.operator"
             )
         if plan.views_between is not None:
             raise InputError(
-                "between_views='depth' makes views by what hides what, which cannot be gone through backwards: "
+                "between_views='depth' interpolates views by occlusion, which has no derivatives: "
                 "pass between_views='auto'"
             )
         if why := abilities(chosen(how.engine, samples.whole())).no_derivatives:
@@ -225,8 +225,8 @@ class Drive:
             if self.in_memory:
                 raise
             raise InputError(
-                f"memory ran out within memory_limit={math.ceil(self.limit)} bytes: there is less than that. Pass "
-                "a smaller one"
+                f"memory ran out within memory_limit={math.ceil(self.limit)} bytes: less than that is available. "
+                "Pass a smaller one"
             ) from None
         return self.finished(found)
 
@@ -269,8 +269,8 @@ class Drive:
             if found.samples * 2 > LARGEST_SAMPLES:
                 error = sampling_error(found) / abs(_mean(found.values))
                 warn_of_result(
-                    f"the sampling error is {error:.2g} of the picture's mean after {found.samples} rays a pixel, "
-                    f"the most there are; {tolerance:g} was asked for"
+                    f"the sampling error is {error:.2g} of the image's mean after {found.samples} rays per pixel, "
+                    f"the maximum; the tolerance is {tolerance:g}"
                 )
                 break
             # The next block of the point sequence: together with the rays before, it is one larger uniform set.
@@ -605,8 +605,8 @@ def _warn_of_unseen(views: Any) -> None:
     """Warn if many of the samples between views are visible in no view."""
     if views.made and views.unseen > MUCH_UNSEEN * views.made:
         warn_of_result(
-            f"{views.unseen / views.made:.1%} of the samples between views show what none of the views around "
-            "them shows (it is hidden there, or outside their pictures): borders go on there"
+            f"{views.unseen / views.made:.1%} of the samples between views are visible in none of the views "
+            "around them (occluded, or outside the views): the surroundings are continued there"
         )
 
 

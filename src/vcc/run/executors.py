@@ -119,7 +119,7 @@ def worker_pool(executor: Any) -> WorkerPool:
     if all(hasattr(executor, name) for name in ("submit", "map", "scheduler_info", "nthreads")):
         return Cluster(executor)
     raise InputError(
-        f"executor is a concurrent.futures.Executor or a dask.distributed.Client, not {executor!r}: on one "
+        f"executor must be a concurrent.futures.Executor or a dask.distributed.Client, not {executor!r}: on one "
         "machine concurrent.futures.ProcessPoolExecutor(), for a cluster distributed.Client('tcp://host:8786')"
     )
 
@@ -140,8 +140,8 @@ def memory_of_task(asked: int | None, workers: WorkerPool | None) -> float:
     if memory < LEAST_ROOM or (asked is not None and asked > memory):
         needed = LEAST_ROOM if asked is None else asked
         raise InputError(
-            f"the least of the executor's workers has {max(memory, 0) / 1e6:.0f} MB for each task, beside "
-            f"Python and its libraries, and {needed / 1e6:.0f} MB are asked for: give workers more memory, or "
+            f"the least of the executor's workers has {max(memory, 0) / 1e6:.0f} MB for each task, without "
+            f"Python and its libraries, and {needed / 1e6:.0f} MB are required: give workers more memory, or "
             "fewer threads each" + ("" if asked is None else ", or pass a smaller limit")
         )
     return min(MEMORY_LIMIT // 4, memory) if asked is None else asked
@@ -182,8 +182,8 @@ class Parcel:
         """
         if self.version != VERSION:
             raise InputError(
-                f"{platform.node()} runs version {VERSION} of the package, and what sends the work runs "
-                f"{self.version}: install the same on both"
+                f"{platform.node()} runs version {VERSION} of the package, and the sender runs "
+                f"{self.version}: install the same version on both"
             )
         return pickle.loads(self.packed)
 
@@ -326,7 +326,7 @@ class Pool:
         except BrokenExecutor as error:
             raise self._broken() from error
         except RuntimeError as error:
-            raise InputError(f"executor takes no work ({error}): pass one that is not shut down") from error
+            raise InputError(f"executor accepts no tasks ({error}): pass one that is not shut down") from error
 
     def _result(self, future: Any) -> Any:
         try:
@@ -334,13 +334,13 @@ class Pool:
         except BrokenExecutor as error:
             raise self._broken() from error
         except CancelledError as error:
-            raise InputError("executor cancelled work that was not done: was it shut down?") from error
+            raise InputError("executor cancelled unfinished tasks: was it shut down?") from error
 
     def _broken(self) -> InputError:
         return InputError(
             f"a process of the executor, {type(self._executor).__name__}, ended before its work was done: killed, "
-            "or out of memory (memory_limit= is what one task may take). Python's pools do not recover: pass a "
-            "new one, or a Dask client, which does what is lost again"
+            "or out of memory (memory_limit= is the limit per task). Python's pools do not recover: pass a "
+            "new one, or a Dask client, which repeats lost tasks"
         )
 
 
@@ -434,10 +434,10 @@ class Cluster:
         found = self._client.run(pydoc.locate, "vcc.base.version.VERSION", on_error="return")
         for address, version in found.items():
             if version is None or (isinstance(version, str) and version != VERSION):
-                has = f"version {version} of the package" if version else "none of the package"
+                has = f"version {version} of the package" if version else "no version of the package"
                 raise InputError(
-                    f"the worker {address} has {has}, and what sends the work has "
-                    f"{VERSION}: install the same on all"
+                    f"the worker {address} has {has}, and the sender has "
+                    f"{VERSION}: install the same version on all"
                 )
 
     def _begin(self, parcel: Any) -> None:
@@ -486,8 +486,8 @@ class Cluster:
         except Exception as error:
             if type(error).__name__ == "KilledWorker":
                 raise InputError(
-                    "a task ended each of the workers that took it, one after the other: most likely it takes "
-                    "more memory than they have. Pass memory_limit=, the bytes of one task"
+                    "a task killed each worker that ran it: most likely it needs "
+                    "more memory than they have. Pass memory_limit=, the bytes per task"
                 ) from error
             raise
 
@@ -504,16 +504,16 @@ class Cluster:
         except TimeoutError as error:
             self._silent = True
             raise InputError(
-                f"the Dask scheduler {self._address} has not answered for {SILENT:g} s: it is stopped, or far too "
-                "busy. See to it, or start another; then start again"
+                f"the Dask scheduler {self._address} has not answered for {SILENT:g} s: it is stopped or "
+                "overloaded. Check it, or start another; then run again"
             ) from error
         except OSError as error:
             raise self._lost() from error
 
     def _lost(self) -> InputError:
         return InputError(
-            f"the connection to the Dask scheduler {self._address} was lost, or the work cancelled, before it was "
-            "done: connect anew with distributed.Client(address), and start again"
+            f"the connection to the Dask scheduler {self._address} was lost, or the tasks were cancelled, before "
+            "they finished: reconnect with distributed.Client(address), and run again"
         )
 
     @property

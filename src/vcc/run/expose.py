@@ -51,7 +51,7 @@ class RawPicture:
     def __post_init__(self) -> None:
         electronics = electronics_of(self.sensor)
         if self.values.dtype not in (np.uint8, np.uint16):
-            raise InputError(f"a recording holds numbers of type uint8 or uint16, not {self.values.dtype}")
+            raise InputError(f"the numbers of a recording must be uint8 or uint16, not {self.values.dtype}")
         if self.values.shape[:2] != self.sensor.shape or self.values.ndim not in (2, 3):
             raise InputError(
                 f"the sensor has {self.sensor.shape} pixels (rows, columns), and the recording's numbers the "
@@ -186,7 +186,7 @@ def electronics_of(sensor: Sensor) -> Electronics:
     """
     if sensor.electronics is None:
         raise InputError(
-            "the sensor has no electronics, and only irradiance can be had of it (capture). Say how it records: "
+            "the sensor has no electronics, so that it has only irradiance (capture). To record, add electronics: "
             "Sensor(…, electronics=vcc.Electronics()), or a table [sensor.electronics] in a camera file"
         )
     return sensor.electronics
@@ -199,7 +199,7 @@ def below_zero(light: NDArray[np.float32]) -> str | None:
         return None
     return (
         f"the picture on the sensor goes down to {low:.3g} (up to {high:.3g}): light cannot be negative, "
-        "and it is taken as dark there"
+        "so these pixels are set to 0"
     )
 
 

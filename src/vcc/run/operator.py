@@ -187,23 +187,23 @@ class Operator:
         """An array of a shape, or several, checked and converted to `dtype`."""
         if (library := library_of(given)) not in ("numpy", "builtins"):
             raise InputError(
-                f"an operator takes arrays of NumPy, not of {library}: pass numpy.asarray({what}); "
-                "vcc.torch.CameraModule carries gradients"
+                f"an operator accepts NumPy arrays, not arrays of {library}: pass numpy.asarray({what}); "
+                "for gradients use vcc.torch.CameraModule"
             )
         numbers = np.asarray(given)
         if numbers.dtype.kind != "f":
             whole = numbers.dtype.kind == "u"
             scaled = f": where {np.iinfo(numbers.dtype).max} is radiance 1, divide by it" if whole else ""
-            raise InputError(f"{what} of an operator are floating-point numbers, not {numbers.dtype}{scaled}")
+            raise InputError(f"{what} of an operator must be floating-point numbers, not {numbers.dtype}{scaled}")
         if numbers.shape != shape and (numbers.shape[1:] != shape or not len(numbers)):
             flat = f": pass {what}.reshape({shape}), or op.as_scipy(), which takes vectors"
             raise InputError(
-                f"{what} of this operator have the shape {shape}, or one axis more before it for several, not "
+                f"{what} of this operator must have the shape {shape}, or one more leading axis for several, not "
                 f"{numbers.shape}{flat if numbers.shape == (math.prod(shape),) else ''}"
             )
         if numbers.size and not (np.isfinite(numbers.min()) and np.isfinite(numbers.max())):
             place = tuple(int(n) for n in np.argwhere(~np.isfinite(numbers))[0])
-            raise InputError(f"{what} are finite numbers; at {place} there is {numbers[place]}")
+            raise InputError(f"{what} must be finite; at {place} there is {numbers[place]}")
         return numbers.astype(self.dtype, copy=False)
 
 
@@ -280,7 +280,9 @@ class Adjoint:
 
     def _into(self, out: Slots, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Slots:
         if tuple(out.shape) != self.T.samples_shape:
-            raise InputError(f"out has the shape {tuple(out.shape)}, and the samples {self.T.samples_shape}")
+            raise InputError(
+                f"out has the shape {tuple(out.shape)}, but the samples have the shape {self.T.samples_shape}"
+            )
         unseen = np.ones(out.shape[:2], dtype=bool)
         for block, samples in self.T._backwards(executor).pieces(picture, progress):
             out[block.slices] = samples

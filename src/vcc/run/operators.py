@@ -88,7 +88,7 @@ def carried_to(
         if stage.faces.bending is not None:
             raise InputError(
                 f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
-                "before it, or look at the picture (camera.capture)"
+                "before it, or compute the image (camera.capture)"
             )
     planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
     for stage in passed:
@@ -205,9 +205,9 @@ def _check_places_of_views(light_field: InMemory, label: str) -> None:
     travel = np.abs(linear[:2, 2:]) @ np.array([columns, rows])
     if (travel > 1e-6 * np.abs(linear[:2, :2]).sum(axis=1)).any():
         raise InputError(
-            f"{label} cannot scatter this light field within its views: the places of its rays depend on the "
-            "pixel, not on the view alone, so that a change of slope leads from one view to others. Resample it "
-            "first, to a frame whose places depend on (i, j) only: lf.resampled(frame, shape)"
+            f"{label} cannot scatter this light field within its views: the positions of its rays depend on the "
+            "pixel, not on the view alone, so that a change of slope moves rays to other views. Resample it "
+            "first, to a frame whose positions depend on (i, j) only: lf.resampled(frame, shape)"
         )
 
 

@@ -58,7 +58,7 @@ class PhotonTransfer(Brief):
         if self.dark_variance < 0.24:
             raise InputError(
                 f"the dark noise is {self.dark_variance:.3g} DN², which is little more than rounding: the "
-                "read noise cannot be told. Take a higher gain"
+                "read noise cannot be estimated. Use a higher gain"
             )
         return math.sqrt(self.dark_variance - _QUANTISATION) / self.gain
 

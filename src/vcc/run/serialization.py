@@ -33,7 +33,7 @@ def check_portable(samples: Samples) -> None:
         return
     if not isinstance(whole, np.ndarray):
         raise InputError(
-            f"executor= takes light fields in NumPy arrays or in stores, not in those of "
+            f"executor= supports light fields in NumPy arrays or in stores, not in arrays of "
             f"{library_of(whole)}: leave it out, or pass "
             "light_field.replaced(numpy.asarray(values))"
         )
@@ -41,9 +41,9 @@ def check_portable(samples: Samples) -> None:
     if size > SENT:
         raise InputError(
             f"this light field takes {size / 1e6:.0f} MB of memory, and with executor= it would be sent "
-            f"to all that work: at most {SENT / 1e6:.0f} MB are. Save it with vcc.store.save_store("
-            "light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'), which each reads for "
-            "itself; or leave executor= out: all cores of this machine work on it anyway"
+            f"to all workers: at most {SENT / 1e6:.0f} MB are sent. Save it with vcc.store.save_store("
+            "light_field, 'scene.zarr') and pass vcc.store.open_store('scene.zarr'), which each worker "
+            "reads; or leave executor= out: all cores of this machine are used anyway"
         )
 
 

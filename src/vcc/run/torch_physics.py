@@ -18,8 +18,8 @@ with checks.package("op.as_deepinv", "deepinv", "deepinv"):
         from deepinv.physics import LinearPhysics
     except RuntimeError as error:  # torchvision built for another torch
         raise InputError(
-            f"deepinv does not load here ({error}): torch and torchvision, which it needs, have to be of one "
-            "build. Install both from one place, such as pip install --force-reinstall torch torchvision "
+            f"deepinv does not load here ({error}): it needs torch and torchvision from the same "
+            "build. Install both from one source, such as pip install --force-reinstall torch torchvision "
             "--index-url https://download.pytorch.org/whl/cpu"
         ) from error
 
@@ -82,16 +82,16 @@ class _Times:
         """Apply the map to each; ``parameters`` are of the noise, which `deepinv` also passes here."""
         if not isinstance(tensor, torch.Tensor) or not tensor.is_floating_point():
             given = tensor.dtype if isinstance(tensor, torch.Tensor) else type(tensor).__name__
-            raise InputError(f"{self.what} are tensors of floating-point numbers here, not {given}")
+            raise InputError(f"{self.what} must be floating-point tensors, not {given}")
         if tensor.device.type != "cpu":
             raise InputError(
-                f"{self.what} are on {tensor.device}, and this physics is computed on the CPU: pass tensor.cpu(), "
-                "and keep the physics in its memory"
+                f"{self.what} are on {tensor.device}, but this physics runs on the CPU: pass tensor.cpu(), "
+                "and keep the physics in CPU memory"
             )
         if tuple(tensor.shape[1:]) != self.shape or not len(tensor):
             raise InputError(
-                f"{self.what} have the shape (batch, channels, …), (B, {', '.join(map(str, self.shape))}) here, "
-                f"not {tuple(tensor.shape)}"
+                f"{self.what} must have the shape (batch, channels, …), here (B, "
+                f"{', '.join(map(str, self.shape))}), not {tuple(tensor.shape)}"
             )
         made: torch.Tensor = _Product.apply(self.map, tensor, self.coloured)
         return made if self.scale == 1 else made * self.scale
