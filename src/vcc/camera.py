@@ -245,8 +245,8 @@ class Camera(Train):
 
         Returns:
             Irradiance on the sensor, radiance × steradian (paper, eq. 5), inverted as on the sensor. For a sensor
-            with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of each in
-            ``photodiodes[row][column]``.
+            with several photodiodes in a pixel, a `vcc.image.PhotodiodeImage`: their sum, with the image of each
+            in ``photodiodes[row][column]``.
 
         Warns:
             ResultWarning: more than 1 % of the required rays are outside the light field; the tolerance was not

@@ -386,7 +386,7 @@ def _draw_frosted(pen: Pen, element: Element, scatter: Scatter, half: float) -> 
 
 
 def _draw_sheet(pen: Pen, element: Element, by_direction: bool = False) -> None:
-    """An element without known shape or transmission by position: a thin sheet, dotted if it filters directions."""
+    """An element without known shape or mask: a thin sheet, dotted if it filters directions."""
     middle = (pen.low + pen.high) / 2
     ends = middle + 1.02 * pen.half * np.array([-1, 1])
     looks: dict[str, Any] = {"dashes": (1, 1)} if by_direction else {}
