@@ -185,8 +185,7 @@ def _width_at(train: Train, z: float) -> float:
 
 
 def _first_opening(train: Train) -> list[float]:
-    sizes = [stage.faces.pattern.size[0] / 2 for stage in train.stages if stage.faces.pattern is not None]
-    return [size for size in sizes if np.isfinite(size)][:1]
+    return [stage.opening[0] / 2 for stage in train.stages if np.isfinite(stage.opening[0])][:1]
 
 
 def _length(value: float, digits: int = 3) -> str:
@@ -194,6 +193,9 @@ def _length(value: float, digits: int = 3) -> str:
 
 
 _NEW: Mapping[str, Callable[[float, float], Json]] = {
+    "angle_filter": lambda long, wide: {
+        "pattern": {"name": "circle", "diameter": _length(wide / long, 2)}  # 1 m for a slope of 1
+    },
     "biprism": lambda long, wide: {"deflection": 0.01, "diameter": _length(1.2 * wide)},
     "coded_diffuser": lambda long, wide: {
         "kernels": [{"name": "gaussian", "sigma": 0.002}, {"name": "gaussian", "sigma": 0.01}],
@@ -204,6 +206,7 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
     "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
     "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
     "lens_array": lambda long, wide: {"pitch": _length(wide / 40, 2), "focal_length": _length(long / 50, 2)},
+    "louvre": lambda long, wide: {"pitch": _length(wide / 10, 2), "height": _length(long / 4, 2)},
     "mask": lambda long, wide: {"pattern": {"name": "circle", "diameter": _length(wide / 2, 2)}},
     "phase_plate": lambda long, wide: {
         "surface": {"name": "cubic", "strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},

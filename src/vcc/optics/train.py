@@ -72,6 +72,12 @@ class Stage(Brief):
         """Rays from the entrance plane to just behind this stage, folded as in ``arriving``."""
         return self.arriving if self.centred is None else self.centred @ self.arriving
 
+    @property
+    def opening(self) -> tuple[float, float]:
+        """(width, height) in metres outside which nothing passes at z; infinite if unbounded, and for terms."""
+        pattern = self.faces.pattern
+        return (math.inf, math.inf) if pattern is None or self.term is not None else pattern.size
+
     def bent(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
         """(Δs, Δt) of the deflection that is not affine, at camera places x, y; errors name the element."""
         bending = self.faces.bending
@@ -320,11 +326,9 @@ class Train(Value, Shown):
         for stage in reversed(self.stages):
             if stage.faces.bending is not None:
                 break  # what lies before it is not imaged as a whole
-            if stage.faces.pattern is None or stage.term is not None:
-                continue
             stop_from_sensor = stage.leaving @ from_sensor
             by_slope = stop_from_sensor.linear[:2, 2:]
-            half = min(stage.faces.pattern.size) / 2
+            half = min(stage.opening) / 2
             if (
                 math.isfinite(half)
                 and abs(np.linalg.det(by_slope)) > 1e-12 * max(np.abs(by_slope).max(), 1e-12) ** 2

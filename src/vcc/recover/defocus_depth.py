@@ -327,11 +327,7 @@ def _beliefs(against: Array, steps: Array, sweeps: int) -> Array:
 
 
 def _opening(camera: Camera) -> float:
-    sizes = [
-        max(stage.faces.pattern.size)
-        for stage in camera.stages
-        if stage.z == 0 and stage.faces.pattern is not None and math.isfinite(max(stage.faces.pattern.size))
-    ]
+    sizes = [max(stage.opening) for stage in camera.stages if stage.z == 0 and math.isfinite(max(stage.opening))]
     if not sizes:
         raise InputError(
             "no opening stands in the entrance plane z = 0 of this camera: give the side of the square through "

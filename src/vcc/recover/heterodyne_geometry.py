@@ -123,6 +123,9 @@ class HeterodyneSetup:
         """
         mask, pattern = _carrier_mask(camera)
         for stage in camera.stages:
+            if stage.term is not None:
+                raise InputError(f"heterodyne decoding needs transmission by position, and {stage.element.label}
+                transmits by direction")
             if stage.faces.bending is not None or stage.faces.scatter is not None:
                 raise InputError(
                     f"heterodyne decoding needs lenses, prisms and masks only, and {stage.element.label} bends or "
@@ -268,6 +271,5 @@ def _carrier_mask(camera: Camera) -> tuple[Mask, CosineSum]:
 
 
 def _aperture(camera: Camera) -> tuple[float, float]:
-    sizes = [(math.inf, math.inf)]
-    sizes += [s.faces.pattern.size for s in camera.stages if s.z == 0 and s.faces.pattern is not None]
+    sizes = [(math.inf, math.inf), *(stage.opening for stage in camera.stages if stage.z == 0)]
     return min(width for width, _ in sizes), min(height for _, height in sizes)
