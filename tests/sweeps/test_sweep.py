@@ -291,5 +291,5 @@ def test_executors_make_the_same_pictures(field, tmp_path):
         here = vcc.sweep(camera(), piece, values)
         np.testing.assert_allclose(sent.pictures, here.pictures, atol=1e-6 * float(alone.pictures.max()))
         large = vcc.LightField.of(np.broadcast_to(np.float32(0), (5, 5, 900, 1000, 1)), field.grid)
-        with pytest.raises(vcc.InputError, match=r"takes 90 MB of memory.* at most 67 MB are\. Save it with"):
+        with pytest.raises(vcc.InputError, match=r"takes 90 MB of memory.* at most 67 MB are sent\. Save it with"):
             vcc.sweep(camera(), large, values, executor=pool)

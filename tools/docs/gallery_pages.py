@@ -68,14 +68,16 @@ def main() -> None:
 
 
 def fingerprint(name: str) -> str:
-    """A short hash of an entry's prose, source and what it imports of the gallery; layout does not count."""
+    """A short hash of an entry's prose, code and what it imports of the gallery; docstrings and layout do not count."""
     prose = sorted((MODULES / "prose").glob(f"{name}*"))
     sources = {path.name: path.read_text(encoding="utf-8") for path in prose}
     waiting = [name.replace("-", "_")]
     while waiting:
         module = waiting.pop()
         sources[module] = (MODULES / f"{module}.py").read_text(encoding="utf-8")
-        for imported in ast.walk(ast.parse(sources[module])):
+        tree = ast.parse(sources[module])
+        sources[module] = ast.unparse(without_docstrings(tree))
+        for imported in ast.walk(tree):
             if isinstance(imported, ast.ImportFrom) and (imported.module or "").startswith("vcc.gallery"):
                 inside = imported.module.removeprefix("vcc.gallery").lstrip(".")
                 others = [inside] if inside else [alias.name for alias in imported.names]
@@ -83,6 +85,16 @@ def fingerprint(name: str) -> str:
         waiting = [each for each in waiting if each not in FRAME]
     text = "".join("".join(sources[module].split()) for module in sorted(sources))
     return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def without_docstrings(tree: ast.Module) -> ast.Module:
+    """A module without strings that stand as statements."""
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            kept = [one for one in body if not (isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant))]
+            node.body = kept or [ast.Pass()]  # type: ignore[attr-defined]
+    return tree
 
 
 def write_page(made: Entry, result: Result) -> None:

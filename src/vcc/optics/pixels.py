@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
 from vcc.optics.terms import Term
@@ -66,8 +67,8 @@ class Microlens:
         return self.height if self.f_number is None else self.f_number * pitch
 
 
-@dataclass(frozen=True)
-class SlopesOfChief:
+@dataclass(frozen=True, eq=False, repr=False)
+class SlopesOfChief(Brief):
     """The slope of the chief ray at each place of the sensor: s₀ = slope · (x, y) + offset.
 
     Args:
