@@ -27,8 +27,8 @@
 Patterns, kernels and surfaces are written by name: the classes of `vcc.patterns` (``open``, ``circle``,
 ``polygon``, ``cells``, ``cosine_sum``, ``bounded`` …, and ``mura``), of `vcc.kernels` (``gaussian``, ``top_hat``,
 ``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). A glass is text,
-``glass = "N-BK7"``, or one of `vcc.glasses`, ``{ name = "abbe", nd = 1.5168, V = 64.17 }``. Arrays are file names or
-rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass, such as a sensor's electronics, is a table:
+``glass = "N-BK7"``, or one of `vcc.glasses`, ``{ name = "abbe", nd = 1.5168, V = 64.17 }``. Arrays are file names
+or rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass, such as a sensor's electronics, is a table:
 ``[sensor.electronics]``. A real lens is a ``first_order`` with ``lens_file = "dgauss.50mm.dat"`` instead of a
 matrix. A sensor has a z, or ``focus = "1.2 m"``: the distance in focus (`vcc.Camera.focused`).
 """

@@ -202,7 +202,10 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
         "width": _length(1.2 * wide),
         "weights": [[[1, 0], [0, 1]], [[0, 1], [1, 0]]],
     },
-    "diffractive_lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
+    "diffractive_lens": lambda long, wide: {
+        "focal_length": _length(2 * long, 2),
+        "diameter": _length(1.2 * wide, 2),
+    },
     "diffuser": lambda long, wide: {"kernel": {"name": "gaussian", "sigma": 0.005}},
     "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
     "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},

@@ -26,7 +26,8 @@ class Dispersive(Element, abc.ABC):
     Args:
         glass: None; the name of a catalogue glass, such as ``"N-BK7"`` (extra ``lenses``); or one of
             `vcc.glasses`.
-        design_wavelength: λ₀, metres, at which the element's own parameters hold; None takes the d line, 587.56 nm.
+        design_wavelength: λ₀, metres, at which the element's own parameters hold; None takes the d line, 587.56
+            nm.
 
     Raises:
         InputError: what is no glass, or a wavelength that is not of light in metres.
