@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from vcc.optics import AngleFilter as AngleFilter
     from vcc.optics import Biprism as Biprism
     from vcc.optics import CodedDiffuser as CodedDiffuser
+    from vcc.optics import DiffractiveLens as DiffractiveLens
     from vcc.optics import Diffuser as Diffuser
     from vcc.optics import Element as Element
     from vcc.optics import Faces as Faces
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from vcc.optics import Term as Term
     from vcc.optics.electronics import Electronics as Electronics
     from vcc.optics.sensor import Sensor as Sensor
+    from vcc.optics.spectrum import Spectrum as Spectrum
     from vcc.plan.how import How as How
     from vcc.prescriptions import load_lens as load_lens
     from vcc.recording import Recording as Recording
@@ -57,6 +59,7 @@ _HOMES = {
     "Biprism": "vcc.optics",
     "Camera": "vcc.camera",
     "CodedDiffuser": "vcc.optics",
+    "DiffractiveLens": "vcc.optics",
     "Diffuser": "vcc.optics",
     "Electronics": "vcc.optics.electronics",
     "Element": "vcc.optics",
@@ -79,6 +82,7 @@ _HOMES = {
     "Recording": "vcc.recording",
     "ResultWarning": "vcc.base.errors",
     "Sensor": "vcc.optics.sensor",
+    "Spectrum": "vcc.optics.spectrum",
     "Term": "vcc.optics",
     "expose_image": "vcc.recording",
     "load_camera": "vcc.camera_file",
@@ -92,6 +96,7 @@ _HOMES = {
 _MODULES = {
     "analysis",
     "gallery",
+    "glasses",
     "jax",
     "kernels",
     "motion",

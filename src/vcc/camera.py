@@ -8,18 +8,23 @@ from collections.abc import Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, Literal, Self, TypeVar, Unpack
 
+from vcc.advice.colour import colour_section, middle_of
 from vcc.advice.explain import Explanation, explained
 from vcc.advice.of_images import Cautions
 from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError, warn_of_result
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, part_of
+from vcc.base.wavelengths import wavelength as checked_wavelength
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image, PhotodiodeImage, interleaved
+from vcc.optics.band import Band
+from vcc.optics.bands import refuse, single_way, trains_of
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
 from vcc.optics.focusing import focused_train
 from vcc.optics.plenoptic import Plenoptic
+from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best, compiled_each, mixture_of
@@ -28,6 +33,7 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import OutputBuffers
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
+from vcc.run.bands import BandImages, SomeChannels, as_share, bands_as_text, largest_shares, once_each
 from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
@@ -40,6 +46,15 @@ Field = TypeVar("Field", bound=InMemory)
 def _warn_of(cautions: Iterable[str]) -> None:
     for caution in cautions:
         warn_of_result(caution)
+
+
+def _check_no_plan(plan: Plan | None) -> None:
+    """Refuse one plan for a camera that has one for each band."""
+    if plan is not None:
+        raise InputError(
+            "plan= is one plan, and this camera depends on the wavelength or the channel, so that it has one for "
+            "each band: leave it out"
+        )
 
 
 def _check_of_the_run(options: Options) -> None:
@@ -212,6 +227,7 @@ class Camera(Train):
         check_is_light_field(light_field)
         light_field.check_complete()
         chosen = How.of(how, options)
+        refuse(self, "one plan for all channels")
         if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
             light_field.grid.disparities.maps(progress)  # now, so that progress is reported
         return compile_best(self, light_field.grid, chosen)
@@ -277,6 +293,9 @@ class Camera(Train):
                     "column)"
                 )
             return self._of_parts(light_field, chosen, executor, progress)
+        if self.depends_on_bands:
+            _check_no_plan(plan)
+            return self._captured_by_bands(light_field, chosen, executor, progress)
         cautions = Cautions(self, light_field.grid)
         _warn_of(cautions.before())
         plan = self._planned(light_field, chosen, plan, options, progress)
@@ -297,6 +316,48 @@ class Camera(Train):
             images = [camera.capture(light_field, how, executor=executor, progress=progress) for camera in cameras]
         tile = [images[row * columns : (row + 1) * columns] for row in range(rows)]
         return interleaved(tile, self) if alternate else PhotodiodeImage.of(tile, self)
+
+    def _captured_by_bands(
+        self, light_field: Samples, how: How, executor: Any, progress: Progress | None
+    ) -> Image:
+        """The image where bands of light meet different elements, or the sensor mixes them."""
+        grid = light_field.grid
+        trains = trains_of(self, grid.channels, grid.wavelengths)
+        if self.sensor.response is not None:
+            matrix_of(self.sensor.response, grid.channels or 1, grid.wavelengths)  # refused before the work begins
+        parts, said = [], []
+        for number, (same, share) in enumerate(zip(trains, largest_shares(trains), strict=True)):
+            part = SomeChannels.of(light_field, same.channels)
+            one = type(self)(same.train.elements, same.train.sensor, name=self.name)
+            cautions, advance = Cautions(one, part.grid), part_of(progress, number, len(trains))
+            plan = one.compile(part, how, progress=advance)
+            found = drive(plan, part, how, advance, executor)
+            parts.append((same, found))
+            found = as_share(found, share)
+            sentences = (*cautions.before(), *plan.cautions, *cautions.of(plan, part, found, how))
+            bands = bands_as_text(same.channels, grid.wavelengths)
+            if share:  # nothing is said of faint orders
+                said.append((found.missing_rays, [(sentence, bands) for sentence in sentences]))
+        worst_first = sorted(said, key=lambda each: -each[0])
+        _warn_of(once_each(each for _, sentences in worst_first for each in sentences))
+        return self._image(BandImages(self.sensor, grid, parts).recorded)
+
+    def at_wavelength(self, wavelength: float) -> Self:
+        """The camera as light of one wavelength meets it, with elements that depend on it no more.
+
+        Args:
+            wavelength: metres.
+
+        Returns:
+            A camera for every use: ``camera.at_wavelength(486 * nm).compile(light_field)``. Its sensor has no
+            response.
+
+        Raises:
+            InputError: a wavelength outside the range of a glass; a mask of several channels, a filter or several
+                orders, of which no single camera makes the image.
+        """
+        train = single_way(self, Band(wavelength=checked_wavelength("wavelength", wavelength)))
+        return type(self)(train.elements, train.sensor, name=self.name)
 
     def _image(self, found: Recorded) -> Image:
         return Image(
@@ -392,7 +453,7 @@ class Camera(Train):
         check_is_light_field(light_field)
         chosen = How.of(how, {**options, "seed": ray_seed})
         asked = Exposure(self.sensor, exposure, seed, radiance, chosen.threads)
-        asked.check_channels(light_field.grid.channels)  # before the work begins
+        asked.check_channels(self.sensor.channels_of(light_field.grid.channels))  # before the work begins
         captured = self.capture(light_field, chosen, plan=plan, executor=executor, progress=progress)
         return recorded(captured, asked)
 
@@ -416,8 +477,25 @@ class Camera(Train):
             options: as in `capture`.
         """
         chosen = How.of(how, options)
+        if self.depends_on_bands:
+            return self._explained_by_bands(light_field, chosen, executor, progress)
         plan = self.compile(light_field, chosen, progress=progress)
         return explained(self, light_field, plan, chosen, executor)
+
+    def _explained_by_bands(
+        self, light_field: Samples, how: How, executor: Any, progress: Progress | None
+    ) -> Explanation:
+        """The plan of the band in the middle, and what colour adds."""
+        grid = light_field.grid
+        trains = trains_of(self, grid.channels, grid.wavelengths)
+        if not trains:
+            raise InputError("nothing passes this camera in any channel: there is no plan to explain")
+        shown = middle_of(trains, grid.wavelengths)
+        one = type(self)(trains[shown].train.elements, trains[shown].train.sensor, name=self.name)
+        text = one.explain(
+            SomeChannels.of(light_field, trains[shown].channels), how, executor=executor, progress=progress
+        )
+        return text.with_section(colour_section(self, trains, grid, shown))
 
     def light_field_at(
         self,
@@ -515,8 +593,9 @@ def each_captured(
     """
     check_is_light_field(light_field)
     light_field.check_complete()
-    if how.between_views == "depth":
-        yield from enumerate(camera.capture(light_field, how) for camera in cameras)
+    if how.between_views == "depth" or any(camera.depends_on_bands for camera in cameras):
+        hows = [how] * len(cameras) if seeds is None else [dataclasses.replace(how, seed=seed) for seed in seeds]
+        yield from enumerate(camera.capture(light_field, one) for camera, one in zip(cameras, hows, strict=True))
         return
     mixture = mixture_of(cameras, light_field.grid, how) if may_be_mixed(light_field, how) else None
     if mixture is not None:

@@ -26,8 +26,9 @@
 
 Patterns, kernels and surfaces are written by name: the classes of `vcc.patterns` (``open``, ``circle``,
 ``polygon``, ``cells``, ``cosine_sum``, ``bounded`` …, and ``mura``), of `vcc.kernels` (``gaussian``, ``top_hat``,
-``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). Arrays are file names or
-rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass, such as a sensor's electronics, is a table:
+``radial``, ``samples``) and of `vcc.surfaces` (``cubic``, ``zernike``, ``height_map`` …). A glass is text,
+``glass = "N-BK7"``, or one of `vcc.glasses`, ``{ name = "abbe", nd = 1.5168, V = 64.17 }``. Arrays are file names
+or rows of numbers (``[[0, 1], [1, 0]]``). A field that is a dataclass, such as a sensor's electronics, is a table:
 ``[sensor.electronics]``. A real lens is a ``first_order`` with ``lens_file = "dgauss.50mm.dat"`` instead of a
 matrix. A sensor has a z, or ``focus = "1.2 m"``: the distance in focus (`vcc.Camera.focused`).
 """
@@ -38,6 +39,7 @@ from os import PathLike
 
 from vcc.camera import Camera
 from vcc.files.camera_families import ELEMENT_KINDS as ELEMENT_KINDS
+from vcc.files.camera_families import GLASS_NAMES as GLASS_NAMES
 from vcc.files.camera_families import KERNEL_NAMES as KERNEL_NAMES
 from vcc.files.camera_families import PATTERN_NAMES as PATTERN_NAMES
 from vcc.files.camera_families import SURFACE_NAMES as SURFACE_NAMES

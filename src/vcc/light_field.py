@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,7 @@ class LightField(InMemory):
             for a whole light field.
         beyond: for a piece, (before, after) along (v, u, t, s): the number of samples of the whole light
             field beyond the piece, in steps of the piece. Slicing sets it; none for a whole light field.
+        wavelengths: see `with_wavelengths`.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
@@ -66,6 +68,7 @@ class LightField(InMemory):
         disparity: Any = None,
         extent: tuple[float, float] | None = None,
         beyond: Beyond = ALL,
+        wavelengths: Sequence[float] | None = None,
     ) -> None:
         if values is None or frame is None:
             raise InputError(
@@ -73,7 +76,7 @@ class LightField(InMemory):
                 "LightField.from_views(values, spacing, slope_per_pixel, focus_distance) makes it for views of "
                 "parallel cameras, and vcc.open_light_field reads files"
             )
-        super().__init__(values, frame, disparity_range, sample, disparity, extent, beyond)
+        super().__init__(values, frame, disparity_range, sample, disparity, extent, beyond, wavelengths)  # type: ignore[arg-type]
 
     @classmethod
     def from_views(
@@ -156,6 +159,18 @@ class LightField(InMemory):
                 main memory in an array of another library than NumPy.
         """
         return self.of(on_gpu(self.values), self.grid)
+
+    def with_wavelengths(self, wavelengths: Sequence[float] | None) -> LightField:
+        """The same light field with the wavelengths of its channels: ``with_wavelengths([610 * nm, 540 * nm])``.
+
+        Args:
+            wavelengths: in the middle of each channel's band, metres, in the order of the channels; for a light
+                field without an axis of channels, one. None removes them.
+
+        Raises:
+            InputError: not as many as channels, or one that is not from 100 nm to 50 µm.
+        """
+        return self.of(self.values, replace(self.grid, wavelengths=wavelengths))  # type: ignore[arg-type]
 
     def scaled(self, factor: float) -> LightField:
         """The light field of a scene enlarged by ``factor`` (slopes stay the same).

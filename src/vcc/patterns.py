@@ -9,6 +9,7 @@ raster. Any function of (x, y) becomes a pattern with `as_pattern`.
 from typing import Any
 
 from vcc.base.hints import no_such_name
+from vcc.shapes.by_channel import ByChannel
 from vcc.shapes.directional import AngularFringes
 from vcc.shapes.patterns import (
     Bounded,
@@ -28,6 +29,7 @@ from vcc.shapes.patterns import (
 __all__ = [
     "AngularFringes",
     "Bounded",
+    "ByChannel",
     "Cells",
     "Circle",
     "CosineSum",

@@ -61,6 +61,7 @@ FACES = {
     "demo.scene",
     "errors",
     "formats.pictures",
+    "glasses",
     "jax",
     "kernels",
     "operators",

@@ -9,13 +9,15 @@ import pytest
 NAMES = {
     "vcc.affine": "Affine",
     "vcc.analysis": "Refocuser expected_deblurring_error fft4 ifft4 mask_spectrum mtf otf psf sampling_advice",
-    "vcc.camera_file": "ELEMENT_KINDS KERNEL_NAMES PATTERN_NAMES SURFACE_NAMES load_camera save_camera",
+    "vcc.camera_file": "ELEMENT_KINDS GLASS_NAMES KERNEL_NAMES PATTERN_NAMES SURFACE_NAMES load_camera "
+    "save_camera",
     "vcc.demo": "run_demo",
     "vcc.demo.scene": "demo_scene",
     "vcc.errors": "CacheWarning InputError ResultWarning",
     "vcc.formats": "lftoolbox open_light_field open_sparse_views read_ground_truth",
     "vcc.formats.pictures": "read_picture",
     "vcc.formats.writing": "save_light_field",
+    "vcc.glasses": "Abbe Catalogue Cauchy Sellmeier Table",
     "vcc.gallery": "ENTRIES entries entry write_entry",
     "vcc.jax": "CameraFunction",
     "vcc.kernels": "Gaussian Radial Samples TopHat",

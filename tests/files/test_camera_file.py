@@ -15,6 +15,7 @@ from vcc import (
     Biprism,
     Camera,
     CodedDiffuser,
+    DiffractiveLens,
     Diffuser,
     Electronics,
     Element,
@@ -30,16 +31,18 @@ from vcc import (
     Pyramid,
     ResultWarning,
     Sensor,
+    Spectrum,
     load_camera,
     load_lens,
 )
 from vcc.base.units import deg, mm, nm, um
-from vcc.camera_file import ELEMENT_KINDS, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
+from vcc.camera_file import ELEMENT_KINDS, GLASS_NAMES, KERNEL_NAMES, PATTERN_NAMES, SURFACE_NAMES, save_camera
 from vcc.files.camera_reading import read_train
 from vcc.files.camera_writing import write_train
 from vcc.files.image_metadata import CameraMark
+from vcc.optics import glass as glasses
 from vcc.optics.train import Train
-from vcc.shapes import kernels, patterns, surfaces
+from vcc.shapes import by_channel, kernels, patterns, surfaces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice
 from vcc.shapes.stacked_patterns import Product
 
@@ -159,6 +162,7 @@ COLOUR = Electronics(
     color_filter="GRBG",
     bit_depth=10,
 )
+FILTER = Spectrum((400 * nm, 0.7 * um), (0.1 / 3, 1.0))
 EVERYTHING = Camera(
     [
         Lens(50 * mm, 20 * mm, name="front"),
@@ -206,8 +210,27 @@ EVERYTHING = Camera(
         LensArray(
             125 * um, (0.5 * mm, -math.inf, 1 / 3 * mm), "hexagonal", 1 * deg, (1e-5, 0), 0.5, True, z=49.5 * mm
         ),
+        Lens(50 * mm, glass="N-BK7", design_wavelength=550 * nm, z=50 * mm),
+        Prism((0.1, 0.0), glass=glasses.Cauchy(1.5046, 0.0042 * um**2, 1e-4 / 3 * um**4), z=50 * mm),
+        PhasePlate(
+            surfaces.Cubic(250.0), glass=glasses.Sellmeier((1.04, 0.23), (0.006 * um**2, 1e-11 / 3)), z=50 * mm
+        ),
+        LensArray(125 * um, 1 * mm, glass=glasses.Table((400 * nm, 0.7 * um), (1.53, 1.51)), z=51 * mm),
+        Biprism(0.01, glass=glasses.Abbe(1.6, 30.0, (0.4 * um, 0.8 * um)), z=51 * mm),
+        Pyramid(4, 0.01, glass=glasses.Catalogue("SCHOTT F2"), z=51 * mm),
+        DiffractiveLens(50 * mm, 9 * mm, 532 * nm, (1, 0), (0.9, 0.1 / 3), z=51 * mm),
+        Mask(RANDOM.random((2, 3, 2)), 10 * mm, spectrum=(FILTER, FILTER), z=51 * mm),
+        Mask(by_channel.ByChannel((patterns.Circle(1 * mm), patterns.Open())), spectrum=FILTER, z=51 * mm),
     ],
-    Sensor(52 * mm, (50, 40), (48 * um, 1e-6 / 3), (1e-3, -1e-9), fill_factor=0.1 / 3, electronics=COLOUR),
+    Sensor(
+        52 * mm,
+        (50, 40),
+        (48 * um, 1e-6 / 3),
+        (1e-3, -1e-9),
+        fill_factor=0.1 / 3,
+        electronics=COLOUR,
+        response=((1 / 3, 0.5), FILTER, (0.0, 1.0)),
+    ),
 )
 
 
@@ -229,6 +252,8 @@ def test_round_trip_is_exact(tmp_path):
         "everything_phase_plate_27_heights.npy",
         "everything_measured_path_paths.npy",
         "everything_prism_array_32_slopes.npy",
+        "everything_mask_44.npy",
+        "everything_mask_44_2.npy",
     }
 
 
@@ -240,12 +265,14 @@ def test_every_kind_and_name_takes_part_in_the_round_trip():
     assert used == set(PATTERN_NAMES.values())
     assert {type(e.kernel) for e in elements if isinstance(e, Diffuser)} == set(KERNEL_NAMES.values())
     assert {type(e.surface) for e in elements if isinstance(e, PhasePlate)} == set(SURFACE_NAMES.values())
+    assert {type(getattr(e, "glass", None)) for e in elements} == {*GLASS_NAMES.values(), str, type(None)}
 
 
 def test_names_are_those_of_the_classes():
     assert list(ELEMENT_KINDS) == [
         "biprism",
         "coded_diffuser",
+        "diffractive_lens",
         "diffuser",
         "first_order",
         "lens",
@@ -267,6 +294,25 @@ def test_names_are_those_of_the_classes():
         "path_map",
         "rough",
     ]
+
+
+def test_reads_glasses_and_spectra(written):
+    camera = written(one("lens", focal_length='"50 mm"', glass='{ name = "cauchy", A = 1.5, B = "0.0042 um2" }'))
+    assert camera.elements[0].glass == glasses.Cauchy(1.5, 0.0042 * um**2)
+    filters = 'spectrum = { wavelengths = ["400 nm", "700 nm"], values = [0, 1] }'
+    camera = written(
+        one("mask", pattern='{ name = "open" }').replace("[sensor]", filters + "\n[sensor]\nresponse='mono'")
+    )
+    assert camera.elements[0].spectrum == Spectrum((400 * nm, 700 * nm), (0.0, 1.0))
+    assert camera.sensor.response == "mono"
+    for wrong, message in (
+        ('{ name = "abbe", nd = 1.5 }', r'glass \(abbe\) has no field "V"'),
+        ("1.5", r'glass is 1.5: write a glass by name, like "N-BK7", or'),
+        ('{ name = "cauchy", A = 1.5, B = 0.0042 }', r'B is 0.0042: an area needs a unit, .*"0.0042 um2"'),
+        ('{ name = "cauchi" }', 'did you mean "cauchy"'),
+    ):
+        with pytest.raises(InputError, match=message):
+            written(one("lens", focal_length='"50 mm"', glass=wrong))
 
 
 def test_reads_kernels_and_surfaces_by_name(written):

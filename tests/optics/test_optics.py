@@ -118,7 +118,7 @@ def test_lenses_and_prisms_that_are_none_are_refused_by_name_and_value(make, mes
         (np.array([[-0.2, 1.0]]), {"width": 1.0}, "mask at z = 20 mm.*goes from -0.2 to 1"),
         (np.array([[np.nan, 1.0]]), {"width": 1.0}, "mask at z = 20 mm.*finite"),
         (np.zeros((3, 3)), {"width": 1.0}, "mask at z = 20 mm is opaque everywhere"),
-        (np.ones((2, 2, 3)), {"width": 1.0}, r"mask at z = 20 mm.*\(2, 2, 3\)"),
+        (np.ones((2, 2, 3, 1)), {"width": 1.0}, r"mask at z = 20 mm.*\(2, 2, 3, 1\)"),
         (np.ones((2, 2)), {}, "mask at z = 20 mm is an array of cells: give its width"),
         (np.ones((2, 2)), {"width": 0.0}, "width of mask at z = 20 mm .* not 0.0"),
         (np.ones((2, 2)), {"width": 1.0, "height": -2.0}, "height of mask at z = 20 mm .* not -2.0"),

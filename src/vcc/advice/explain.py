@@ -45,6 +45,13 @@ class Explanation(Shown, str):
     def __repr__(self) -> str:
         return str(self)
 
+    def with_section(self, section: str) -> Explanation:
+        """The same with lines below; the plan and the times stay those of what is explained above."""
+        longer = Explanation(f"{self}\n\n{wrapped(section)}")
+        for name in self.__slots__:
+            setattr(longer, name, getattr(self, name))
+        return longer
+
 
 def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: Any = None) -> Explanation:
     """A plan for a light field as text; see `vcc.Camera.explain`.
@@ -98,7 +105,7 @@ def _what(train: Train, grid: Grid) -> str:
     lines = [
         f"Light field: {nv}×{nu} views of {nt}×{ns} pixels, "
         f"{grid.channels or 1} channel{'s' if (grid.channels or 1) > 1 else ''}, "
-        f"{grid.kind} {SAMPLES_IN_WORDS[grid.sample]}; {grid.geometry}"
+        f"{grid.kind} {SAMPLES_IN_WORDS[grid.sample]}; {grid.geometry}{grid.bands}"
     ]
     return "\n".join([*lines, *train.listed()])
 

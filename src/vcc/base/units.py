@@ -31,19 +31,35 @@ _UNITS: Final[dict[str, dict[str, float]]] = {
     "length": {"m": m, "cm": cm, "mm": mm, "um": um, "µm": um, "μm": um, "nm": nm},
     "angle": {"rad": rad, "mrad": mrad, "deg": deg, "°": deg},
     "time": {"s": s, "ms": ms, "us": us, "µs": us, "μs": us},
+    "area": {"m2": m**2, "mm2": mm**2, "um2": um**2, "µm2": um**2, "μm2": um**2, "nm2": nm**2},
+    "area squared": {"m4": m**4, "mm4": mm**4, "um4": um**4, "µm4": um**4, "μm4": um**4, "nm4": nm**4},
 }
 """The units read without pint: the factors of this module, so that "48 um" is 48 * um exactly."""
 _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
     "length": ("m", "mm", "um", "nm"),
     "angle": ("rad", "mrad", "deg"),
     "time": ("s", "ms", "us"),
+    "area": ("m2", "mm2", "um2"),
+    "area squared": ("m4", "mm4", "um4"),
 }
 _CLEARLY: Final = 4
 """Number of characters that another unit must save to be used instead of the most readable one."""
 _LONGEST_SHOWN: Final = 60
 """Characters of an invalid quantity that an error shows."""
-SI_NAMES: Final = {"length": "metre", "angle": "radian", "time": "second"}
-_EXAMPLES: Final = {"length": "50 mm", "angle": "2 deg", "time": "10 ms"}
+SI_NAMES: Final = {
+    "length": "metre",
+    "angle": "radian",
+    "time": "second",
+    "area": "square metre",
+    "area squared": "fourth power of a metre",
+}
+_EXAMPLES: Final = {
+    "length": "50 mm",
+    "angle": "2 deg",
+    "time": "10 ms",
+    "area": "0.0042 um2",
+    "area squared": "0.0001 um4",
+}
 _QUANTITY: Final = re.compile(r"([+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf))\s*(.*)", re.DOTALL)
 _UNIT_NAME: Final = re.compile(r"[^\W\d]+|°")
 
@@ -179,4 +195,4 @@ def _written(value: float, unit: str, dimension: str, digits: int) -> str:
 
 
 def _article(dimension: str) -> str:
-    return "an" if dimension == "angle" else "a"
+    return "a" if dimension in ("length", "time") else "an"

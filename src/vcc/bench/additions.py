@@ -202,6 +202,10 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
         "width": _length(1.2 * wide),
         "weights": [[[1, 0], [0, 1]], [[0, 1], [1, 0]]],
     },
+    "diffractive_lens": lambda long, wide: {
+        "focal_length": _length(2 * long, 2),
+        "diameter": _length(1.2 * wide, 2),
+    },
     "diffuser": lambda long, wide: {"kernel": {"name": "gaussian", "sigma": 0.005}},
     "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
     "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
@@ -294,6 +298,9 @@ _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
         "width": _length(wide, 2),
         "height": _length(wide, 2),
     },
+    "by_channel": lambda long, wide: {
+        "patterns": [{"name": "circle", "diameter": _length(wide / n, 2)} for n in (1, 1.5, 2)]
+    },
     "cell_apertures": lambda long, wide: {"lattice": {"layout": "square", "pitch": _length(wide / 10, 2)}},
     "cell_block": lambda long, wide: {
         "lattice": {"layout": "square", "pitch": _length(wide / 10, 2)},
@@ -319,6 +326,11 @@ _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
         "normalise": True,
     },
     "top_hat": lambda long, wide: {"width": 0.01},
+    "abbe": lambda long, wide: {"nd": 1.5168, "V": 64.17},
+    "catalogue": lambda long, wide: {"glass": "N-BK7"},
+    "cauchy": lambda long, wide: {"A": 1.5046, "B": "0.0042 um2"},
+    "sellmeier": lambda long, wide: {"B": [1.2], "C": ["0.01 um2"]},
+    "table": lambda long, wide: {"wavelengths": ["400 nm", "700 nm"], "indices": [1.53, 1.513]},
     "axicon": lambda long, wide: {"slope": 0.01},
     "cubic": lambda long, wide: {"strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
     "height_map": lambda long, wide: {

@@ -46,6 +46,8 @@ def capture(
             image = moving.capture(
                 field, length, how, start=start, time_tolerance=tolerance, progress=advance, executor=executor
             )
+        elif moving.camera.depends_on_bands:
+            image = moving.camera.capture(field, how, executor=executor, progress=advance)
         else:
             plan = moving.camera.compile(field, how, progress=advance)
             long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > WORTH_A_BAR

@@ -8,6 +8,7 @@ from typing import Any
 
 from vcc.base.showing import spread
 from vcc.base.units import short
+from vcc.base.wavelengths import as_text
 from vcc.fields.grid import SAMPLES_IN_WORDS, Grid
 from vcc.store import StoredLightField, StoredVideo
 from vcc.store.video_layout import Between
@@ -47,6 +48,8 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
         "size": f"{packed / 1e6:,.1f} MB on disk, {stored.view_bytes * nv * nu / 1e6:,.1f} MB in memory, linear",
         "cameras": stored.grid.geometry,
     }
+    if stored.wavelengths is not None:
+        lines["bands"] = as_text(stored.wavelengths).partition(" ")[2]
     lines |= _assumed(stored.provenance)
     if stored.lossy is not None:
         lines["lossy"] = loss(stored.lossy)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
@@ -14,6 +15,8 @@ from vcc.base.checks import above_zero
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
+from vcc.base.wavelengths import as_text
+from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.disparity import Disparities, scaled
 from vcc.fields.parallax import Axis
 from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, indices
@@ -87,6 +90,8 @@ class Grid(Value):
             decisions of a camera that depend on the extent of the views are then the same for all pieces.
         beyond: of a piece, (before, after) along (v, u, t, s): samples, in this piece's steps, that the whole
             light field has beyond the piece.
+        wavelengths: in the middle of each channel's band, metres; of a light field without an axis of channels,
+            one. None where not stated.
     """
 
     shape: tuple[int, ...]
@@ -97,9 +102,13 @@ class Grid(Value):
     disparities: Disparities = field(default_factory=Disparities)
     extent: tuple[float, float] = (0.0, 0.0)
     beyond: Beyond = ALL
+    wavelengths: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         check_frame(self.frame)
+        if self.wavelengths is not None:
+            checked = all_checked("wavelengths of a light field", self.wavelengths, self.channels or 1)
+            object.__setattr__(self, "wavelengths", checked)
         if not all(self.extent):
             object.__setattr__(self, "extent", (float(self.shape[0]), float(self.shape[1])))
 
@@ -142,7 +151,15 @@ class Grid(Value):
             disparities=self.disparities.piece(ranges),
             extent=(self.extent[0] / abs(v), self.extent[1] / abs(u)),
             beyond=tuple(map(_beyond, ranges[:4], self.shape[:4], self.beyond)),
+            wavelengths=self.wavelengths if len(ranges) < 5 else self._wavelengths_of(ranges[4]),
         ), ranges
+
+    def of_channels(self, channels: Sequence[int]) -> Grid:
+        """The grid of some of the channels, which keeps their axis."""
+        return replace(self, shape=(*self.shape[:4], len(channels)), wavelengths=self._wavelengths_of(channels))
+
+    def _wavelengths_of(self, channels: Sequence[int]) -> tuple[float, ...] | None:
+        return None if self.wavelengths is None else tuple(self.wavelengths[n] for n in channels)
 
     @property
     def whole_grid(self) -> Grid:
@@ -239,9 +256,14 @@ class Grid(Value):
         converging = "parallel views" if parallel else f"converging at {short(linear[0, 0] / linear[2, 0])}"
         return f"spacing {short(abs(linear[0, 0]))}, slope per pixel {abs(linear[2, 2]):.6g}, {converging}"
 
+    @property
+    def bands(self) -> str:
+        """The wavelengths as text, behind other words: ``", bands 465, 540, 610 nm"``; empty where unknown."""
+        return "" if self.wavelengths is None else f", {as_text(self.wavelengths)}"
+
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
-        return f"Grid({sizes} {self.kind} {SAMPLES_IN_WORDS[self.sample]}, {self.geometry})"
+        return f"Grid({sizes} {self.kind} {SAMPLES_IN_WORDS[self.sample]}, {self.geometry}{self.bands})"
 
 
 def check_shape(shape: tuple[int, ...]) -> None:

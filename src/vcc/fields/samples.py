@@ -127,6 +127,7 @@ class InMemory(OnGrid):
     disparity: Any = None
     extent: tuple[float, float] | None = None
     beyond: Beyond = ALL
+    wavelengths: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         check_shape(shape_of(self.values))
@@ -139,6 +140,8 @@ class InMemory(OnGrid):
             )
         check_samples(self.values)
         self._complete()
+        if self.wavelengths is not None:
+            object.__setattr__(self, "wavelengths", self.grid.wavelengths)  # checked there
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Its samples and its grid: other processes do not validate them again."""
@@ -171,6 +174,7 @@ class InMemory(OnGrid):
             "disparity": grid.disparities,
             "extent": grid.extent,
             "beyond": grid.beyond,
+            "wavelengths": grid.wavelengths,
         }
         for name, part in parts.items():
             object.__setattr__(made, name, part)
@@ -190,6 +194,7 @@ class InMemory(OnGrid):
             self.disparity,
             self.extent or (0.0, 0.0),
             self.beyond,
+            self.wavelengths,
         )
 
     @property
@@ -229,6 +234,8 @@ class InMemory(OnGrid):
     def replaced(self, values: Any) -> Self:
         """The same frame and scene with other samples, for instance of another array library.
 
+        Wavelengths are kept where the number of channels is.
+
         Raises:
             InputError: another grid of samples, or samples that `vcc.LightField` does not accept.
         """
@@ -236,12 +243,13 @@ class InMemory(OnGrid):
             raise InputError(
                 f"samples of shape {tuple(values.shape)} do not fit a light field of shape {self.shape}"
             )
-        return replace(self, values=values)
+        same = tuple(values.shape)[4:] == self.shape[4:]
+        return replace(self, values=values, wavelengths=self.wavelengths if same else None)
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
         samples = f"{to_dtype(self.values)} {SAMPLES_IN_WORDS[self.sample]}"
-        return f"{type(self).__name__}({sizes} {samples}, {self.grid.geometry})"
+        return f"{type(self).__name__}({sizes} {samples}, {self.grid.geometry}{self.grid.bands})"
 
 
 def shape_of(values: Any) -> tuple[int, ...]:

@@ -22,10 +22,11 @@ from vcc import optics
 from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.optics import Element, FirstOrder
+from vcc.optics import Element, FirstOrder, glass
+from vcc.optics.glass import Glass
 from vcc.prescriptions import load_lens
 from vcc.prescriptions.model import Reference
-from vcc.shapes import directional, height_maps, kernels, lattice, patterns, surfaces, zernike
+from vcc.shapes import by_channel, directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
 from vcc.shapes.stacked_patterns import Product
@@ -43,7 +44,9 @@ def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
 """The class of each ``kind`` in a camera file. Add your own classes to read and write them."""
 
-PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice, directional) | {"product": Product}
+PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice, directional, by_channel) | {
+    "product": Product
+}
 """The class of each pattern ``name`` in a camera file. Add your own."""
 del PATTERN_NAMES["function_pattern"]  # a Python function, which a file cannot store
 
@@ -52,6 +55,9 @@ KERNEL_NAMES: dict[str, type[Kernel]] = _named(Kernel, kernels)
 
 SURFACE_NAMES: dict[str, type[Surface]] = _named(Surface, surfaces, zernike, height_maps)
 """The class of each ``name`` of a phase plate's surface in a camera file. Add your own."""
+
+GLASS_NAMES: dict[str, type[Glass]] = _named(Glass, glass)
+"""Which class each ``name`` of a glass in a camera file stands for. Add your own."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,7 +96,7 @@ class Family:
     @property
     def module(self) -> str:
         """The public module of the family: "vcc.patterns"."""
-        return f"vcc.{self.noun}s"
+        return f"vcc.{self.noun}{'es' if self.noun.endswith('s') else 's'}"
 
     @property
     def table(self) -> str:
@@ -117,6 +123,12 @@ FAMILIES = (
         SURFACE_NAMES,
         '{ name = "cubic", strength = 250.0 }',
         "vcc.surfaces.PathMap(paths, width=…) with the optical path in metres at cell centres",
+    ),
+    Family(
+        Glass,
+        GLASS_NAMES,
+        '"N-BK7", or { name = "abbe", nd = 1.5168, V = 64.17 }',
+        "vcc.glasses.Table(wavelengths, indices)",
     ),
 )
 

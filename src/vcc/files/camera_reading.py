@@ -366,13 +366,15 @@ def _read_value(given: Any, hint: Any, unit: str | None, what: str, beside: Besi
     if (
         family is not None
         and not (isinstance(given, list) and items)
+        and not (isinstance(given, str) and str in choices)
         and not (arrays and not isinstance(given, dict))
     ):
         return _read_named(given, family, arrays, what, beside)
     if arrays:
         _check_no_name(given, family, what, beside)
         return read_array(given, unit, family is not None and family.base is Pattern, what, beside)
-    if items and (isinstance(given, list) or not {int, float, str} & set(choices)):
+    is_table = isinstance(given, dict) and any(map(dataclasses.is_dataclass, choices))
+    if items and (isinstance(given, list) or not (is_table or {int, float, str} & set(choices))):
         return _read_list(given, items, unit, what, beside)
     for choice in choices:
         if choice is Affine:

@@ -3,8 +3,8 @@
 An ``.npy`` contains samples only, so their axes may have to be specified and the cameras are unknown. The
 ``.npz`` that `save` writes contains ``values`` (v, u, t, s[, channel]), the 5×5 ``frame`` (indices from 0 to
 metres and slopes), ``transfer`` ("linear" or "srgb"), ``sample`` ("mean" or "point") and, if known,
-``disparity_range``. Other programs may write the same format; without ``sample`` the samples are means over
-pixels.
+``disparity_range`` and ``wavelengths`` (of the channels, metres). Other programs may write the same format;
+without ``sample`` the samples are means over pixels.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
@@ -31,7 +32,7 @@ from vcc.formats.grid import Decoded, Geometry
 
 ENDINGS = (".npy", ".npz")
 
-_OWN = ("values", "frame", "transfer", "sample", "disparity_range")
+_OWN = ("values", "frame", "transfer", "sample", "disparity_range", "wavelengths")
 _MOST_LIKELY_CHANNELS = 4  # an axis this short is colour rather than the width of a picture
 _ORDER = "vutsc"
 _AGAIN = "Copy it again from where it came from"
@@ -84,6 +85,7 @@ def read(
         geometry=Geometry(
             disparity_range=_disparity_range(arrays.get("disparity_range"), path),
             sample=_sample(arrays.get("sample"), path),
+            wavelengths=_wavelengths(arrays.get("wavelengths"), values, path),
         ),
         frame=_frame(arrays.get("frame"), shape is None and axes is None, path),
     )
@@ -110,6 +112,8 @@ def save(light_field: Samples, path: str | PathLike[str]) -> Path:
     }
     if grid.disparity_range is not None:
         arrays["disparity_range"] = np.array(grid.disparity_range)
+    if grid.wavelengths is not None:
+        arrays["wavelengths"] = np.array(grid.wavelengths)
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
     return path
@@ -254,6 +258,13 @@ def _sample(stated: NDArray[Any] | None, path: Path) -> Sample:
     if stated.shape == () and stated.item() == "point":
         return "point"
     raise InputError(f'{path}: its "sample" is {stated.tolist()!r}; "mean" and "point" are known')
+
+
+def _wavelengths(stated: NDArray[Any] | None, values: NDArray[Any], path: Path) -> tuple[float, ...] | None:
+    if stated is None:
+        return None
+    channels = values.shape[4] if values.ndim == 5 else 1
+    return all_checked(f"{path}: its wavelengths", stated.reshape(-1), channels)
 
 
 def _frame(stated: NDArray[Any] | None, axes_as_stored: bool, path: Path) -> Affine | None:

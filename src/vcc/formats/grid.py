@@ -55,6 +55,7 @@ class Geometry:
             that the files are counted in reverse.
         picture_shape: (rows, columns) required of the pictures.
         sample: meaning of a sample, see `vcc.LightField`; means over pixels unless a file states otherwise.
+        wavelengths: of the channels, metres.
     """
 
     spacing: tuple[float, float] | None = None
@@ -67,6 +68,7 @@ class Geometry:
     directions_are_true: bool = False
     picture_shape: tuple[int, int] | None = None
     sample: Sample = "mean"
+    wavelengths: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,7 +13,8 @@ from pathlib import Path
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_text
-from vcc.base.units import mm
+from vcc.base.units import mm, nm
+from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.grid import Sample
 from vcc.formats.cameras import Cameras
 from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
@@ -97,6 +98,7 @@ def read_geometry(folder: Path) -> Geometry | None:
         disparity_range=(low, high) if low <= high else None,  # NaN if not stated
         picture_shape=(int(height), int(width)),
         sample=_sample(settings, folder),
+        wavelengths=_wavelengths(settings, folder),
     )
 
 
@@ -108,6 +110,7 @@ def parameters_text(
     *,
     disparity_range: tuple[float, float] | None = None,
     sample: Sample = "mean",
+    wavelengths: tuple[float, ...] | None = None,
 ) -> str:
     """The text of a ``parameters.cfg`` that `read_geometry` reads as these cameras.
 
@@ -118,6 +121,7 @@ def parameters_text(
         scene: name of the scene.
         disparity_range: (lowest, highest), pixels per view, if known.
         sample: meaning of a sample.
+        wavelengths: of the channels, metres, if known.
     """
     rows, columns = views
     height, width = picture
@@ -146,6 +150,8 @@ def parameters_text(
         lines += [f"disp_min = {low!r}", f"disp_max = {high!r}"]
     if sample != "mean":
         lines.append(f"sample = {sample}")
+    if wavelengths is not None:
+        lines.append(f"wavelengths_nm = {', '.join(repr(round(each / nm, 9)) for each in wavelengths)}")
     return "\n".join(lines) + "\n"
 
 
@@ -171,6 +177,19 @@ def _sample(settings: configparser.ConfigParser, folder: Path) -> Sample:
     if stated == "point":
         return "point"
     raise InputError(f'{parameters_file(folder)}: sample is "{stated}"; "mean" and "point" are known')
+
+
+def _wavelengths(settings: configparser.ConfigParser, folder: Path) -> tuple[float, ...] | None:
+    """An entry of ours: nanometres, one for each channel."""
+    stated = settings.get("meta", "wavelengths_nm", fallback=None)
+    if stated is None:
+        return None
+    place = f"{parameters_file(folder)}: wavelengths_nm"
+    try:
+        given = [float(number) * nm for number in stated.replace(",", " ").split()]
+    except ValueError:
+        raise InputError(f'{place} is "{stated}": write numbers, such as 610, 540, 465') from None
+    return all_checked(place, given)
 
 
 def _settings(folder: Path) -> configparser.ConfigParser | None:

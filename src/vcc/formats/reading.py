@@ -21,6 +21,7 @@ from vcc.fields.grid import Grid
 from vcc.fields.samples import check_samples
 from vcc.files.transfer import decode
 from vcc.formats import containers
+from vcc.formats.bands import bands_in, stacked
 from vcc.formats.cameras import Cameras
 from vcc.formats.dark_views import dark_notice
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
@@ -94,7 +95,8 @@ def open_light_field(
     ``parameters.cfg``); names with camera, focal length and sensor; names of the Stanford gantry
     (``out_RR_CC_V_U.png``); names that end in a row and a column (``view_03_07.png``, counted from any number);
     running numbers (``frame_017.png``). A camera file, ``parameters.cfg`` or ``param.txt``, is used with any of
-    them.
+    them. A folder of bands has such a folder for each wavelength, named ``450nm``, ``520nm``, …, with grey
+    pictures.
 
     Args:
         path: the folder or file.
@@ -136,6 +138,15 @@ def open_light_field(
     path = expanded(path)
     given = Given(spacing, slope_per_pixel, focus_distance)
     with reading(path, "a light field"):
+        if bands := bands_in(path):
+            how: dict[str, Any] = {
+                "transfer": transfer,
+                "orientation": orientation,
+                "views": views,
+                "order": order,
+            }
+            how |= {"files_outside": files_outside, **options, **vars(given)}
+            return stacked(bands, lambda each, part: open_light_field(each, progress=part, **how), progress)
         if containers.container_of(path) is not None:
             decoded = _decoded(path, views, order, progress, _with(options, files_outside))
             opened = _opened_file(decoded, path, given, transfer)
@@ -334,7 +345,9 @@ def _put_in_order(
         cameras = cameras.turned()
     frame = info.frame if cameras is None else cameras.frame(values.shape)
     assert frame is not None  # a frame is stated if there are no cameras
-    grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown)
+    with checks.within(str(path)):
+        stated = opened.geometry.wavelengths
+        grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown, wavelengths=stated)
     light_field = LightField.of(values, grid)
     views = {(row, column): values[row, column] for row, column in np.ndindex(values.shape[:2])}
     remarks = (*info.notices, opened.notice, moved.notice, dark_notice(views))

@@ -358,5 +358,6 @@ def _parameters(grid: Grid, cameras: Cameras, path: Path, kind: str) -> tuple[st
         path.name,
         disparity_range=grid.disparity_range,
         sample=grid.sample,
+        wavelengths=grid.wavelengths,
     )
     return text, ""

@@ -21,6 +21,7 @@ from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.learn.parameters import CONTENT, Parameter, parameter, put, read
 from vcc.learn.scales import scale
+from vcc.optics.bands import refuse
 from vcc.optics.train import Train
 from vcc.plan.choice import Choices, Computed, compute, decide
 from vcc.plan.following import Linear, Parts, differences, plan_again
@@ -63,6 +64,7 @@ class Chain:
     """
 
     def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
+        refuse(train, "learning")
         self.train, self.grid, self.how = train, grid, how or How()
         self.names = tuple(names)
         self._parts = Parts()

@@ -351,8 +351,9 @@ class _Work:
     @property
     @cached
     def _dark(self) -> _Gathered:
-        channels = next(iter(self._light.at(self._start)))[1]().grid.shape[4:]
-        return _Gathered(np.zeros((*self._moving.camera.sensor.shape, *channels)), 0.0, {})
+        sensor = self._moving.camera.sensor
+        channels = sensor.channels_of(next(iter(self._light.at(self._start)))[1]().grid.channels)
+        return _Gathered(np.zeros((*sensor.shape, *([] if channels is None else [channels]))), 0.0, {})
 
     def _pictures(self, wanted: Mapping[State, Callable[[], Samples]]) -> dict[State, _Gathered]:
         """The images of cameras and light fields, each computed once while it is in the cache."""

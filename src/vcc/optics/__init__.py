@@ -1,6 +1,7 @@
 """Optical elements: each a frozen dataclass with parameters and one method, `faces`."""
 
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, SlopeFunction
+from vcc.optics.diffractive_lens import DiffractiveLens
 from vcc.optics.diffuser import CodedDiffuser, Diffuser
 from vcc.optics.direction import AngleFilter, Louvre
 from vcc.optics.faces import Element, Faces, Part
@@ -21,6 +22,7 @@ __all__ = [
     "CellDeflection",
     "CodedDiffuser",
     "Deflection",
+    "DiffractiveLens",
     "Diffuser",
     "Element",
     "Faces",

@@ -21,6 +21,7 @@ from vcc.base.affine import Affine
 from vcc.base.describe import kind_in_words, parameters_in_words
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
+from vcc.optics.band import Band
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
 from vcc.optics.terms import Term
@@ -167,6 +168,24 @@ class Element(Shown, abc.ABC):
         return (faces,)
 
     @property
+    def depends_on_band(self) -> bool:
+        """Whether `ways` differs from band to band; `faces` then holds for the design wavelength."""
+        return False
+
+    def ways(self, band: Band) -> tuple[Way, ...]:
+        """What the element does to one band of light: elements that do not depend on the band, and weights.
+
+        The image of the band is the sum of the images by each of them, times its weight; none of them absorbs all.
+
+        Args:
+            band: the channel and its wavelength.
+
+        Raises:
+            InputError: a band without a wavelength, or one that the element is not known for.
+        """
+        return ((1.0, self),)
+
+    @property
     def kind(self) -> str:
         """The kind of element as text, in lower case."""
         return kind_in_words(type(self))
@@ -191,6 +210,9 @@ class Element(Shown, abc.ABC):
         """The element's parameters as text, for `explain`."""
         return parameters_in_words(self, leave_out=("z", "name", "source"))
 
+
+Way = tuple[float, Element]
+"""A share of a band's light, and the element that this share meets."""
 
 Part = Faces | Affine
 """One part that light meets: the faces of a thin element, or a map of rays to another plane."""

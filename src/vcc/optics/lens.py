@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from vcc.base import checks
 from vcc.base.affine import Affine
-from vcc.optics.faces import Element, Faces
+from vcc.optics.dispersion import Dispersive
+from vcc.optics.faces import Faces
 from vcc.shapes.patterns import Circle
 
 
 @dataclass(frozen=True)
-class Lens(Element):
+class Lens(Dispersive):
     """A thin lens, with or without a rim: s' = s − u/f (paper, eq. 3).
 
     Paraxial: slopes, not angles, so the lens is perfect at any aperture.
@@ -19,9 +21,11 @@ class Lens(Element):
     Args:
         focal_length: metres; negative for a diverging lens.
         diameter: of the round opening, metres; None for no rim.
+        glass: None, or what the lens is made of: f ∝ 1/(n(λ) − 1); see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``focal_length`` holds.
 
     Raises:
-        InputError: a focal length of 0 or NaN, a diameter of 0 or less.
+        InputError: a focal length of 0 or NaN, a diameter of 0 or less, what is no glass.
     """
 
     focal_length: float = field(metadata={"unit": "length"})
@@ -36,3 +40,6 @@ class Lens(Element):
         """A deflection towards the axis, and a round hole if there is a diameter."""
         rim = None if self.diameter is None else Circle(self.diameter)
         return Faces(deflection=Affine.lens(self.focal_length), transmission=rim)
+
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        return {"focal_length": self.focal_length / factor}

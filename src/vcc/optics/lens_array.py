@@ -14,7 +14,8 @@ from vcc.base.describe import Brief, parameters_in_words
 from vcc.base.errors import InputError
 from vcc.base.values import Value
 from vcc.optics.deflections import CellDeflection
-from vcc.optics.faces import Element, Faces
+from vcc.optics.dispersion import Dispersive
+from vcc.optics.faces import Faces
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice, interleaved
 from vcc.shapes.patterns import Bounded, Open, Pattern
 
@@ -23,7 +24,7 @@ LARGEST_DISC = {"square": math.pi / 4, "hexagonal": math.pi / (2 * math.sqrt(3))
 
 
 @dataclass(frozen=True, repr=False)
-class LensArray(Brief, Element):
+class LensArray(Brief, Dispersive):
     """A sheet of equal lenslets side by side, on a square or hexagonal lattice, of one or several focal lengths.
 
     Within a cell centred at c the deflection is that of a thin lens: Δs = −(x − c)/f. With the sensor f behind,
@@ -45,6 +46,8 @@ class LensArray(Brief, Element):
             one; otherwise they have the shape of the cells.
         width: of the whole sheet, metres, opaque outside; None is unbounded.
         height: metres; None makes the sheet square.
+        glass: None, or what it is made of: f ∝ 1/(n(λ) − 1); see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``focal_length`` holds.
 
     Raises:
         InputError: a pitch of 0 or less, a focal length of 0 or NaN, an unknown layout, a fill factor
@@ -133,6 +136,10 @@ class LensArray(Brief, Element):
         deflection = CellDeflection(self.lattice, powers, np.zeros((*powers.shape, 2)))
         return Faces(deflection=deflection, transmission=self._transmission())
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        weaker = tuple(focal_length / factor for focal_length in self.focal_lengths)
+        return {"focal_length": weaker if isinstance(self.focal_length, tuple) else weaker[0]}
+
     def _transmission(self) -> Pattern | None:
         opening: Pattern = Open()
         if self.circular or self.fill_factor not in (None, 1):
@@ -148,7 +155,7 @@ class LensArray(Brief, Element):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PrismArray(Brief, Value, Element):
+class PrismArray(Brief, Value, Dispersive):
     """Rows and columns of prisms side by side, each with its own deflection, opaque around them.
 
     With a focal length, each cell is also a lens: the lens-prism array of Georgiev and Intwala (2006), which
@@ -162,6 +169,8 @@ class PrismArray(Brief, Value, Element):
             pitch to the right. The middle of the rectangle around all cells is the element's middle.
         focal_length: of all cells, metres; None for prisms alone.
         rotation: of the array around the element's middle, radians, from x towards y. It does not rotate slopes.
+        glass: None, or what it is made of: δ and 1/f ∝ n(λ) − 1; see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``slopes`` and ``focal_length`` hold.
 
     Raises:
         InputError: slopes of another shape or not finite, a pitch of 0 or less, an unknown layout, a focal length
@@ -209,6 +218,10 @@ class PrismArray(Brief, Value, Element):
         if self.layout == "square" and self.rotation == 0:
             return Faces(deflection, Bounded(Open(), columns * self.pitch, rows * self.pitch))
         return Faces(deflection, CellBlock(self.lattice, rows, columns))
+
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        focal_length = None if self.focal_length is None else self.focal_length / factor
+        return {"slopes": self.slopes * factor, "focal_length": focal_length}
 
     def described(self) -> str:
         """The number of cells and the parameters as text."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,10 @@ from vcc.base.errors import InputError
 from vcc.base.hints import NoSuchMember
 from vcc.base.units import short
 from vcc.optics.deflections import Deflection, SlopeFunction, checked_slopes
-from vcc.optics.faces import Element, Faces
+from vcc.optics.dispersion import Dispersive
+from vcc.optics.faces import Faces
 from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
-from vcc.shapes.surface import Surface
+from vcc.shapes.surface import Scaled, Surface
 
 Array = NDArray[np.float64]
 
@@ -50,7 +52,7 @@ class SurfaceDeflection(Deflection):
 
 
 @dataclass(frozen=True)
-class PhasePlate(Element):
+class PhasePlate(Dispersive):
     """A thin plate that adds an optical path OPL(x, y): rays are deflected by Δs = ∂OPL/∂x, Δt = ∂OPL/∂y.
 
     Geometric optics: a ray is deflected, but neither split nor delayed. docs/elements/phase-plate.md explains when
@@ -62,13 +64,16 @@ class PhasePlate(Element):
         diameter: of a round opening, metres.
         width: of a rectangular opening, metres.
         height: of a rectangular opening, metres; None makes it square.
+        glass: None, or what the plate is made of: slopes ∝ n(λ) − 1; see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``surface`` holds. A surface with a refractive index of its own (a
+            height map, a rough surface) is given by heights, and that index must be that of the glass there.
 
     Without a size, a surface that is defined on a sheet (a height map, a path map, a rough surface) is as large as
     its sheet, and others have no rim. Outside a rim the plate is opaque.
 
     Raises:
         InputError: a surface of another type, a size of zero or less, a diameter and a width together, a height
-            without a width, or an opening larger than the surface's sheet.
+            without a width, an opening larger than the surface's sheet, or what is no glass.
     """
 
     cubic = NoSuchMember("PhasePlate(surfaces.Cubic(strength))")
@@ -124,6 +129,14 @@ class PhasePlate(Element):
             return SurfaceDeflection(self.surface)
         return SlopeFunction(_given_whole_arrays(self.surface))
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        if not isinstance(self.surface, Surface):
+            return {"surface": partial(_scaled_slopes, self.surface, factor)}
+        index = getattr(self.surface, "refractive_index", None)
+        if index is None:
+            return {"surface": Scaled(self.surface, factor)}
+        return {"surface": replace(self.surface, refractive_index=1 + (index - 1) * factor)}  # type: ignore[type-var]
+
     def _opening(self) -> Pattern | None:
         if self.diameter is not None:
             return Circle(self.diameter)
@@ -136,6 +149,11 @@ class PhasePlate(Element):
         name = getattr(self.surface, "__name__", type(self.surface).__name__)
         sizes = parameters_in_words(self, leave_out=("z", "name", "surface"))
         return f"slopes by {name}" + (f", {sizes}" if sizes else "")
+
+
+def _scaled_slopes(function: Callable[[Array, Array], Any], factor: float, x: Array, y: Array) -> Any:
+    s, t = function(x, y)
+    return factor * np.asarray(s), factor * np.asarray(t)
 
 
 def _given_whole_arrays(function: Callable[[Array, Array], Any]) -> Callable[[Array, Array], Any]:

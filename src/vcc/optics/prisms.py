@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -11,12 +12,13 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.optics.deflections import FacetDeflection
-from vcc.optics.faces import Element, Faces
+from vcc.optics.dispersion import Dispersive
+from vcc.optics.faces import Faces
 from vcc.shapes.patterns import Circle
 
 
 @dataclass(frozen=True)
-class Biprism(Element):
+class Biprism(Dispersive):
     """Two prisms whose bases meet in a line through the middle: Fresnel's biprism.
 
     In front of a camera it shows each point of the scene twice, which makes it a stereo camera (Lee and Kweon
@@ -27,6 +29,8 @@ class Biprism(Element):
             towards the line where they meet; if negative, away from it; 0 has no effect.
         rotation: of that line, which is along y at 0, radians, from x towards y.
         diameter: of a round rim, metres; None for no rim.
+        glass: None, or what it is made of: δ ∝ n(λ) − 1; see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``deflection`` holds.
 
     Raises:
         InputError: a deflection or rotation that is not finite, a diameter of 0 or less.
@@ -44,9 +48,12 @@ class Biprism(Element):
         """Two facets, each deflecting along its own direction, and a rim if there is a diameter."""
         return _facets(self, 2)
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        return {"deflection": self.deflection * factor}
+
 
 @dataclass(frozen=True)
-class Pyramid(Element):
+class Pyramid(Dispersive):
     """A pyramid of plane facets around the axis, each of which forms one image of the scene.
 
     Args:
@@ -55,6 +62,8 @@ class Pyramid(Element):
             axis if positive, away from it if negative; 0 has no effect.
         rotation: of the facets, radians, from x towards y; at 0 the middle of a facet is to the right.
         diameter: of a round rim, metres; None for no rim.
+        glass: None, or what it is made of: δ ∝ n(λ) − 1; see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``deflection`` holds.
 
     Raises:
         InputError: another number of sides, a deflection or rotation that is not finite, a diameter of 0 or less.
@@ -78,6 +87,9 @@ class Pyramid(Element):
         """Facets around the middle, each deflecting along its own direction, and a rim if there is a diameter."""
         return _facets(self, int(self.sides))
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        return {"deflection": self.deflection * factor}
+
 
 def _check(element: Biprism | Pyramid) -> None:
     for name in ("deflection", "rotation"):
@@ -96,7 +108,7 @@ def _facets(element: Biprism | Pyramid, number: int) -> Faces:
 
 
 @dataclass(frozen=True)
-class Prism(Element):
+class Prism(Dispersive):
     """A thin prism: adds the same slope to every ray, s' = s + δs, t' = t + δt.
 
     The paper prints its prism matrices (eq. 4) as shears, in contradiction to its text; this class implements
@@ -104,6 +116,8 @@ class Prism(Element):
 
     Args:
         deflection: (δs, δt), dimensionless slopes; positive moves light to the right and down.
+        glass: None, or what it is made of: δ ∝ n(λ) − 1; see `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: metres, at which ``deflection`` holds.
 
     Raises:
         InputError: not two finite numbers.
@@ -119,3 +133,6 @@ class Prism(Element):
     def faces(self) -> Faces:
         """A constant deflection."""
         return Faces(deflection=Affine.prism(self.deflection))
+
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        return {"deflection": tuple(slope * factor for slope in self.deflection)}

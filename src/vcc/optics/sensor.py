@@ -16,6 +16,7 @@ from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics.electronics import Electronics
 from vcc.optics.pixels import Microlens
+from vcc.optics.response import Response, checked_response
 from vcc.shapes.patterns import Pattern, as_pattern
 
 
@@ -38,10 +39,15 @@ class Sensor(Shown):
         angular_response: transmission of pixels by the slopes (s, t) of light, 0 to 1: a `vcc.patterns.Pattern`,
             in which a length of 1 m is a slope of 1, or a function of two arrays. Rows of columns of patterns are
             a tile that repeats over the sensor from its top left pixel. None: pixels respond alike to all slopes.
+        response: from bands of light to the sensor's channels; None keeps the light field's channels. A matrix
+            (sensor channels, bands); or for each channel a `vcc.Spectrum` of sensitivity, or a function of the
+            wavelength in metres; or ``"mono"``, one grey image of all bands. See `vcc.optics.response.matrix_of`
+            for what they mean.
 
     Raises:
         InputError: a pitch of zero or less, fewer than one pixel, a place that is not finite, a fill factor
-            outside its range, fewer than one photodiode, or a microlens without photodiodes.
+            outside its range, fewer than one photodiode, a microlens without photodiodes, or what is
+            no response.
     """
 
     z: float = field(metadata={"unit": "length"})
@@ -58,6 +64,7 @@ class Sensor(Shown):
         | tuple[tuple[Pattern, ...], ...]
         | None
     ) = None
+    response: Response | None = None
 
     def __post_init__(self) -> None:
         checks.finite("the sensor's z", self.z, "metres")
@@ -71,6 +78,8 @@ class Sensor(Shown):
                 f"the sensor's electronics are a vcc.Electronics, not a {type(self.electronics).__name__}"
             )
         self._check_pixels()
+        if self.response is not None:
+            object.__setattr__(self, "response", checked_response(self.response))
         if not isinstance(self.pitch, int | float):
             object.__setattr__(self, "pitch", self.pitches)
         object.__setattr__(self, "shape", shape)
@@ -94,6 +103,16 @@ class Sensor(Shown):
             )
         for pitch in pitches:
             checks.above_zero("the sensor's pitch", pitch, unit="m")
+
+    def channels_of(self, bands: int | None) -> int | None:
+        """How many channels an image of light has; None for a grey one.
+
+        Args:
+            bands: how many the light has; None for light without an axis of channels.
+        """
+        if self.response is None:
+            return bands
+        return None if isinstance(self.response, str) else len(self.response)
 
     @property
     def pixel_kinds(self) -> tuple[tuple[Pattern | None, ...], ...]:

@@ -364,6 +364,12 @@ class Train(Value, Shown):
         return "\n".join([head, *self.listed()])
 
     @property
+    @cached
+    def depends_on_bands(self) -> bool:
+        """Whether bands of light meet different elements, or the sensor mixes them: see `vcc.optics.bands`."""
+        return self.sensor.response is not None or any(element.depends_on_band for element in self.elements)
+
+    @property
     def stages(self) -> tuple[Stage, ...]:
         """All stages that light meets on its way to the sensor, in order."""
         return self._path[0]

@@ -10,6 +10,7 @@ from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
+from vcc.optics.bands import refuse
 from vcc.optics.train import Train
 from vcc.plan.coverage import AskedLight, Missing
 from vcc.plan.depth_rule import ViewsBetween, denser
@@ -145,6 +146,7 @@ class _Making:
                 f"{len(kinds)}×{len(kinds[0])} angular responses: capture it, or plan camera.pixel_kind(row, "
                 "column)"
             )
+        refuse(train, "one plan for all channels")
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts
 

@@ -10,9 +10,10 @@ from os import PathLike
 
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, read_bytes, reading
+from vcc.base.wavelengths import D_LINE
+from vcc.optics.catalogues import Glasses
 from vcc.optics.first_order import FirstOrder
 from vcc.prescriptions import pbrt, zemax
-from vcc.prescriptions.glasses import D_LINE, Glasses
 from vcc.prescriptions.model import Prescription, Reference, Surface
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]

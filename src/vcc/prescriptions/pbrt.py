@@ -12,7 +12,7 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-from vcc.prescriptions.glasses import Glasses
+from vcc.optics.catalogues import Glasses
 from vcc.prescriptions.model import Prescription, Surface
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import cm, m, mm
-from vcc.prescriptions.glasses import Glasses
+from vcc.optics.catalogues import Glasses
 from vcc.prescriptions.model import Prescription, Surface
 
 _UNITS = {

@@ -25,6 +25,7 @@ from vcc.fields.disparity import Disparities
 from vcc.fields.grid import ALL
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.fields.samples import InMemory, maps_of
+from vcc.optics.bands import refuse
 from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
@@ -81,6 +82,8 @@ def carried_to(
     Raises:
         InputError: z behind the sensor, or an element before z that is not affine, unlike a lens or a prism.
     """
+    if any(element.depends_on_band for element in train.elements):
+        refuse(train, "one light field of all channels inside the camera")
     if z > train.sensor.z:
         raise InputError(f"z = {z * 1e3:g} mm lies behind the sensor at {train.sensor.z * 1e3:g} mm")
     passed = list(itertools.takewhile(lambda stage: _passed(stage, z, before), train.stages))
@@ -132,6 +135,11 @@ def _weights(
 
 def masked(light_field: Field, mask: Mask, memory_limit: int | None = None) -> Field:
     """The paper's dot product L · K; see `vcc.LightField.masked`."""
+    if mask.depends_on_band:
+        raise InputError(
+            f"{mask.label} has a pattern or a transmission for each channel, and light_field.masked weights all "
+            "channels alike: mask channel by channel, light_field[..., n : n + 1], or put it in a vcc.Camera"
+        )
     pattern = mask.faces().pattern
     assert pattern is not None
     return masked_at(light_field, [(pattern, mask.decentre, Affine.identity())], memory_limit)

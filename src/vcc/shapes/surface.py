@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import abc
 import math
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -83,6 +84,44 @@ class Surface(Shown, abc.ABC):
     def described(self) -> str:
         """The surface as text, such as ``"quadratic (focal length 50 mm)"``."""
         return with_parameters(kind_in_words(type(self)), parameters_in_words(self))
+
+
+@dataclass(frozen=True)
+class Scaled(Surface):
+    """A surface whose optical path is some times as long: the same glass at another wavelength.
+
+    Args:
+        surface: what is scaled.
+        factor: of its path.
+    """
+
+    surface: Surface
+    factor: float
+
+    def path(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """The path of the surface times the factor, metres."""
+        return self.factor * self.surface.path(x, y)
+
+    def slopes(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """The slopes of the surface times the factor."""
+        s, t = self.surface.slopes(x, y)
+        return self.factor * s, self.factor * t
+
+    @property
+    def affine(self) -> Affine | None:
+        """The scaled deflection where that of the surface is affine."""
+        given = self.surface.affine
+        return None if given is None else Affine(np.eye(5) + self.factor * (given.matrix - np.eye(5)))
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of the surface."""
+        return self.surface.size
+
+    def largest(self, half_width: float, half_height: float) -> tuple[float, float]:
+        """The bounds of the surface times the factor."""
+        s, t = self.surface.largest(half_width, half_height)
+        return abs(self.factor) * s, abs(self.factor) * t
 
 
 def places(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:

@@ -15,6 +15,7 @@ from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.version import VERSION
+from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.grid import Sample
 from vcc.store.held import IDENTITY
 
@@ -51,6 +52,7 @@ class Attributes(Brief):
         complete: whether all views are present.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` for stores without this attribute.
         identity: a random text drawn when the store is made (`vcc.store.held`); None for older stores.
+        wavelengths: in the middle of each channel's band, metres, or None; stores without the attribute have none.
     """
 
     frame: Affine
@@ -63,9 +65,11 @@ class Attributes(Brief):
     complete: bool = False
     sample: Sample = "mean"
     identity: str | None = None
+    wavelengths: tuple[float, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The attributes as JSON data."""
+        wavelengths = {} if self.wavelengths is None else {"wavelengths": list(self.wavelengths)}
         return {
             "format_version": FORMAT_VERSION,
             IDENTITY: self.identity,
@@ -75,6 +79,7 @@ class Attributes(Brief):
             "transfer": self.transfer,
             "sample": self.sample,
             "channel_names": None if self.channel_names is None else list(self.channel_names),
+            **wavelengths,
             "disparity_range": None if self.disparity_range is None else list(self.disparity_range),
             "provenance": plain(self.provenance, "provenance"),
             "description": None if self.description is None else plain(self.description, "description"),
@@ -119,6 +124,7 @@ class Attributes(Brief):
                 complete=stated["complete"],
                 sample=stated.get("sample", "mean"),
                 identity=stated.get(IDENTITY),
+                wavelengths=_tuple(stated.get("wavelengths")),
             )
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its attributes cannot be used: {error}") from None
@@ -148,6 +154,9 @@ class Attributes(Brief):
             raise InputError(
                 f"{owner}: {len(self.channel_names)} channel_names for {channels or 'no'} channels: give one each"
             )
+        if self.wavelengths is not None:
+            count = None if channels == "unknown" else channels or 1
+            all_checked(f"{owner}: wavelengths", self.wavelengths, count)
 
     def finished(self, lossy: dict[str, Any] | None) -> Attributes:
         """Copy of the attributes for a complete store."""

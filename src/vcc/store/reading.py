@@ -6,6 +6,7 @@ import math
 import os
 import platform
 import warnings
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -85,6 +86,7 @@ class StoredLightField(OnGrid):
             self.sample,
             self.disparity_range,
             Disparities(find=self._kept_or_found, measure=self._measured),
+            wavelengths=self.wavelengths,
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -122,6 +124,11 @@ class StoredLightField(OnGrid):
     def channel_names(self) -> tuple[str, ...] | None:
         """A name for each channel; None if not stated."""
         return self.attributes.channel_names
+
+    @property
+    def wavelengths(self) -> tuple[float, ...] | None:
+        """In the middle of each channel's band, metres, if stated."""
+        return self.attributes.wavelengths
 
     @property
     def disparity_range(self) -> tuple[float, float] | None:
@@ -207,6 +214,14 @@ class StoredLightField(OnGrid):
     def scaled(self, factor: float) -> StoredLightField:
         """The light field of the scene scaled in size, without reading samples. See `vcc.LightField.scaled`."""
         return replace(self, attributes=replace(self.attributes, frame=self.grid.scaled(factor).frame))
+
+    def with_wavelengths(self, wavelengths: Sequence[float] | None) -> StoredLightField:
+        """The same light field with the wavelengths of its channels; the store itself is unchanged.
+
+        See `vcc.LightField.with_wavelengths`. To keep them, write a store: ``vcc.store.save_store(stored, path)``.
+        """
+        grid = replace(self.grid, wavelengths=wavelengths)  # type: ignore[arg-type]
+        return replace(self, attributes=replace(self.attributes, wavelengths=grid.wavelengths))
 
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are missing."""

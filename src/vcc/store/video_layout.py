@@ -46,6 +46,7 @@ class Common(Brief):
         transfer: transfer function of the stored samples.
         sample: meaning of a sample, ``"mean"`` or ``"point"``.
         channel_names: a name for each channel, or None.
+        wavelengths: in the middle of each channel's band, metres, or None.
     """
 
     shape: tuple[int, ...]
@@ -54,11 +55,12 @@ class Common(Brief):
     transfer: Transfer
     sample: Sample
     channel_names: tuple[str, ...] | None
+    wavelengths: tuple[float, ...] | None = None
 
     @property
     def grid(self) -> Grid:
         """A frame without its samples, as stored."""
-        return Grid(self.shape, self.frame, self.kind, self.sample)
+        return Grid(self.shape, self.frame, self.kind, self.sample, wavelengths=self.wavelengths)
 
     def difference(self, other: Common) -> str:
         """Text for the differences from ``other``; empty if there are none."""
@@ -68,6 +70,7 @@ class Common(Brief):
             "transfer": (one.transfer for one in (self, other)),
             "sample": (one.sample for one in (self, other)),
             "channel_names": (one.channel_names for one in (self, other)),
+            "wavelengths": (one.wavelengths for one in (self, other)),
         }
         words = [f"{name} {here} instead of {there}" for name, (here, there) in told.items() if here != there]
         if self.frame != other.frame:
@@ -87,6 +90,7 @@ class Common(Brief):
             "transfer": self.transfer,
             "sample": self.sample,
             "channel_names": None if self.channel_names is None else list(self.channel_names),
+            **({} if self.wavelengths is None else {"wavelengths": list(self.wavelengths)}),
         }
 
     @classmethod
@@ -103,7 +107,7 @@ class Common(Brief):
             raise InputError(f"{path}: its grid does not state {', '.join(missing)} (see docs/store.md)")
         checks.one_of(f"{path}: dtype", stated["dtype"], DTYPES)
         try:
-            names = stated.get("channel_names")
+            names, wavelengths = stated.get("channel_names"), stated.get("wavelengths")
             made = cls(
                 tuple(checks.whole_number_between("a size of shape", size, 1) for size in stated["shape"]),
                 np.dtype(stated["dtype"]),
@@ -111,11 +115,14 @@ class Common(Brief):
                 stated["transfer"],
                 stated.get("sample", "mean"),
                 None if names is None else tuple(names),
+                None if wavelengths is None else tuple(wavelengths),
             )
             check_shape(made.shape)
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its grid cannot be used: {error}") from None
-        attributes = Attributes(made.frame, made.transfer, made.channel_names, sample=made.sample)
+        attributes = Attributes(
+            made.frame, made.transfer, made.channel_names, sample=made.sample, wavelengths=made.wavelengths
+        )
         attributes.check(str(path), made.shape[4] if len(made.shape) == 5 else None)
         return made
 

@@ -149,7 +149,9 @@ def _identity(folder: Path) -> Any:
 
 def common_of(frame: StoredLightField) -> Common:
     """The properties that a frame shares with the other frames of its video."""
-    return Common(frame.shape, frame.dtype, frame.frame, frame.transfer, frame.sample, frame.channel_names)
+    return Common(
+        frame.shape, frame.dtype, frame.frame, frame.transfer, frame.sample, frame.channel_names, frame.wavelengths
+    )
 
 
 def open_video(path: str | PathLike[str]) -> StoredVideo:

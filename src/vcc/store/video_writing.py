@@ -97,6 +97,7 @@ class VideoWriter:
             kept.transfer,
             grid.sample,
             kept.channel_names or self.packing.channel_names,
+            grid.wavelengths,
         )
         stated = {"disparity_range": grid.disparity_range, "provenance": kept.provenance}
         maps = grid.disparities.maps() if grid.disparities.known else None
@@ -169,6 +170,7 @@ class VideoWriter:
             transfer=common.transfer,
             channel_names=common.channel_names,
             sample=common.sample,
+            wavelengths=common.wavelengths,
             chunks=self.packing.chunks,
             compression=self.packing.compression,
             **stated,

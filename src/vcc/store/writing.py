@@ -215,6 +215,7 @@ def create_store(
     channel_names: tuple[str, ...] | None = None,
     disparity_range: tuple[float, float] | None = None,
     sample: Sample = "mean",
+    wavelengths: tuple[float, ...] | None = None,
     chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> StoreWriter:
@@ -231,6 +232,7 @@ def create_store(
         channel_names: a name for each channel.
         disparity_range: (lowest, highest), pixels per view along u, if known.
         sample: ``"mean"`` over a pixel or ``"point"``, see `vcc.LightField`.
+        wavelengths: in the middle of each channel's band, metres, if known.
         chunks: rows of pixels per chunk, or (rows, columns): cameras and parts that need few pixels of each
             view read only the chunks that contain them. None uses rows of about 128 KiB.
         compression: `Lossless` or `Lossy`; None is ``Lossless()``.
@@ -258,6 +260,8 @@ def create_store(
         "chunks": list(chunks) if isinstance(chunks, tuple) else chunks,
         "sample": sample,
     }
+    if wavelengths is not None:
+        settings["wavelengths"] = list(wavelengths)
     made = None if description is None else {"maker": description, SETTINGS: settings}
     attributes = Attributes(
         frame,
@@ -268,6 +272,7 @@ def create_store(
         None if made is None else plain(made, "description"),
         sample=sample,
         identity=drawn(),
+        wavelengths=None if wavelengths is None else tuple(map(float, wavelengths)),
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # raises for data that JSON cannot represent, before anything is created
@@ -369,7 +374,11 @@ def write_views(
         lock = WriterLock(folder)
         try:
             clear_leftovers(folder, lock.patience)
-            stated |= {"disparity_range": grid.disparity_range, "sample": grid.sample}
+            stated |= {
+                "disparity_range": grid.disparity_range,
+                "sample": grid.sample,
+                "wavelengths": grid.wavelengths,
+            }
             part = part_of(folder)
             begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
             with in_one_piece(folder, part, begin, partial(_put_in_place, part, folder, overwrite)) as writer:

@@ -180,6 +180,8 @@ class Work(Brief):
     def batch_size(self) -> int:
         """The number of cameras in a batch: limited by memory, and to a few seconds of work."""
         camera, channels = self.cameras[0], self.light_field.grid.channels or 1
+        if camera.depends_on_bands:  # each camera has several plans, and shares no work with others
+            return 1
         pixels = math.prod(camera.sensor.shape) * channels
         samples = camera.compile(self.light_field, self.how).samples_touched * channels
         least = 1 if self.light_field.whole() is not None else SHARE_A_READING

