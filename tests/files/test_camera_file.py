@@ -12,6 +12,7 @@ from hypothesis import strategies as some
 
 from vcc import (
     Affine,
+    AngleFilter,
     Biprism,
     Camera,
     CodedDiffuser,
@@ -24,7 +25,9 @@ from vcc import (
     InputError,
     Lens,
     LensArray,
+    Louvre,
     Mask,
+    Microlens,
     PhasePlate,
     Prism,
     PrismArray,
@@ -43,6 +46,7 @@ from vcc.files.image_metadata import CameraMark
 from vcc.optics import glass as glasses
 from vcc.optics.train import Train
 from vcc.shapes import by_channel, kernels, patterns, surfaces
+from vcc.shapes.directional import AngularFringes, Gaps, SoftRectangle
 from vcc.shapes.lattice import CellApertures, CellBlock, Lattice
 from vcc.shapes.stacked_patterns import Product
 
@@ -210,6 +214,10 @@ EVERYTHING = Camera(
         LensArray(
             125 * um, (0.5 * mm, -math.inf, 1 / 3 * mm), "hexagonal", 1 * deg, (1e-5, 0), 0.5, True, z=49.5 * mm
         ),
+        Louvre(1 * mm, 1 / 3 * mm, 0.1 * mm, 20 * deg, z=50 * mm),
+        AngleFilter(AngularFringes(20 / 3, 0.1, 0.9, 0.2), z=50 * mm),
+        AngleFilter(SoftRectangle(left=-0.1, bottom=1 / 3, ramp=0.01), z=50 * mm),
+        AngleFilter(Gaps(0.1, 0.1 / 3), z=50 * mm),
         Lens(50 * mm, glass="N-BK7", design_wavelength=550 * nm, z=50 * mm),
         Prism((0.1, 0.0), glass=glasses.Cauchy(1.5046, 0.0042 * um**2, 1e-4 / 3 * um**4), z=50 * mm),
         PhasePlate(
@@ -230,6 +238,9 @@ EVERYTHING = Camera(
         fill_factor=0.1 / 3,
         electronics=COLOUR,
         response=((1 / 3, 0.5), FILTER, (0.0, 1.0)),
+        photodiodes=(1, 2),
+        microlens=Microlens(f_number=1.4, pupil_distance=math.inf, crosstalk=1e-6 / 3),
+        angular_response=((AngularFringes(20.0), patterns.Circle(0.1 / 3)),),
     ),
 )
 
@@ -252,15 +263,15 @@ def test_round_trip_is_exact(tmp_path):
         "everything_phase_plate_27_heights.npy",
         "everything_measured_path_paths.npy",
         "everything_prism_array_32_slopes.npy",
-        "everything_mask_44.npy",
-        "everything_mask_44_2.npy",
+        "everything_mask_48.npy",
+        "everything_mask_48_2.npy",
     }
 
 
 def test_every_kind_and_name_takes_part_in_the_round_trip():
     elements = EVERYTHING.elements
     assert {type(element) for element in elements} == set(ELEMENT_KINDS.values())
-    used = {type(e.pattern) for e in elements if isinstance(e, Mask)}
+    used = {type(e.pattern) for e in elements if isinstance(e, Mask | AngleFilter)}
     used |= {type(part) for e in elements if isinstance(e, Mask) for part in getattr(e.pattern, "patterns", ())}
     assert used == set(PATTERN_NAMES.values())
     assert {type(e.kernel) for e in elements if isinstance(e, Diffuser)} == set(KERNEL_NAMES.values())
@@ -270,6 +281,7 @@ def test_every_kind_and_name_takes_part_in_the_round_trip():
 
 def test_names_are_those_of_the_classes():
     assert list(ELEMENT_KINDS) == [
+        "angle_filter",
         "biprism",
         "coded_diffuser",
         "diffractive_lens",
@@ -277,6 +289,7 @@ def test_names_are_those_of_the_classes():
         "first_order",
         "lens",
         "lens_array",
+        "louvre",
         "mask",
         "phase_plate",
         "prism",
@@ -498,8 +511,8 @@ MASK = r'element 2 \(mask "code"\): pattern'
         ("sensor = 5", r"the sensor is a table that starts with a line \[sensor\]"),
         ("[elements]\nz = 1\n" + SENSOR, r"each element starts with a line \[\[elements\]\]"),
         ("[[element]]\nz = 1\n" + SENSOR, r'unknown table "element": did you mean "elements"\?'),
-        (element(None) + SENSOR, 'element 1 has no kind: add kind = … with one of "biprism", "coded_diff'),
-        (element("stop") + SENSOR, 'element 1: kind "stop" is not known; known are "biprism", "coded_diffuser", '),
+        (element(None) + SENSOR, 'element 1 has no kind: add kind = … with one of "angle_filter", "biprism'),
+        (element("stop") + SENSOR, 'element 1: kind "stop" is not known; known are "angle_filter", "biprism", '),
         (one("lens", z="true", focal_length='"5 mm"'), r"element 1 \(lens\): z is true: a length needs a unit"),
         (one("mask", pattern="[[0, 1]]"), r'give its width in metres, e.g. width = "30 mm"'),
         (
@@ -507,7 +520,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
             r'there is no file "circle" in .*; a pattern is written by name: \{ name = "circle"',
         ),
         (element("lense") + SENSOR, 'element 1: kind "lense" is not known: did you mean "lens"'),
-        (element("xyz") + SENSOR, 'kind "xyz" is not known; known are "biprism", .*"pyramid"$'),
+        (element("xyz") + SENSOR, 'kind "xyz" is not known; known are "angle_filter", .*"pyramid"$'),
         ("[[elements]]\nkind = 5\n" + SENSOR, "element 1: kind is 5: write it as text"),
         (LENS + element() + SENSOR, r'element 2 \(lens\) has no field "focal_length"'),
         (
