@@ -68,7 +68,7 @@ def main() -> None:
 
 
 def fingerprint(name: str) -> str:
-    """A short hash of an entry's prose and code, and of what it imports of the gallery; docstrings do not count."""
+    """A short hash of an entry's prose and code, and of what it imports of the gallery, docstrings left out."""
     prose = sorted((MODULES / "prose").glob(f"{name}*"))
     sources = {path.name: path.read_text(encoding="utf-8") for path in prose}
     waiting = [name.replace("-", "_")]
