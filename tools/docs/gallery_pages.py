@@ -33,6 +33,7 @@ THUMBNAILS = {
     "good-apertures": ("patterns", (0.604, 0.092, 0.799, 0.49)),
     "light-field-rendering": ("from-before", (0, 0, 1, 1)),
     "plenoptic": ("raw", (0.52, 0.05, 0.98, 0.95)),
+    "angle-sensitive-pixels": ("recording", (0.52, 0.05, 0.98, 0.95)),
     "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "focal-sweep": ("scene-restored", (0, 0.2, 0.5, 0.7)),
@@ -42,6 +43,7 @@ THUMBNAILS = {
 DESK = HERE / "data" / "desk.zarr"
 RENDERED = {
     "plenoptic": ("raw", "views", "refocused"),
+    "angle-sensitive-pixels": ("recording", "views", "refocused"),
     "coded-aperture-refocusing": ("scene-open-recorded", "scene-coded-recorded", "scene-open", "scene-coded"),
     "diffuser-depth-of-field": ("scene-plain", "scene-coded", "scene-restored"),
 }

@@ -16,6 +16,7 @@ ENTRIES = (
     "good-apertures",
     "light-field-rendering",
     "plenoptic",
+    "angle-sensitive-pixels",
     "integral-lens-prism",
     "biprism-stereo",
     "wavefront-coding",
