@@ -124,8 +124,10 @@ class HeterodyneSetup:
         mask, pattern = _carrier_mask(camera)
         for stage in camera.stages:
             if stage.term is not None:
-                raise InputError(f"heterodyne decoding needs transmission by position, and {stage.element.label}
-                transmits by direction")
+                raise InputError(
+                    f"heterodyne decoding needs transmission by position, and {stage.element.label} transmits by "
+                    "direction"
+                )
             if stage.faces.bending is not None or stage.faces.scatter is not None:
                 raise InputError(
                     f"heterodyne decoding needs lenses, prisms and masks only, and {stage.element.label} bends or "
