@@ -244,6 +244,9 @@ class Camera(Train):
     ) -> Image:
         """The image that the sensor records of a light field.
 
+        Elements that depend on the wavelength or the channel, and a sensor with a response, make an image of each
+        band, by one plan for all bands that meet equal elements; ``plan`` is then not accepted.
+
         Args:
             light_field: at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`). A light
                 field on disk is read in pieces whose images are summed.

@@ -51,15 +51,14 @@ def wavelengths(name: str, values: Any, count: int | None = None) -> tuple[float
     Raises:
         InputError: no such sequence, another number of them, or one that is not from 100 nm to 50 µm.
     """
-    if isinstance(values, str) or not isinstance(values, Iterable):
+    if isinstance(values, str) or not hasattr(values, "__len__"):
         raise InputError(
             f"{name} are a sequence in metres, such as [610 * nm, 540 * nm, 465 * nm], not {values!r}"
         )
-    listed = tuple(wavelength(f"{name}, number {number},", each) for number, each in enumerate(values, start=1))
-    if (count is not None and len(listed) != count) or not listed:
+    if len(values) != count and (count is not None or not len(values)):
         wanted = f"{count} channel{'' if count == 1 else 's'}" if count else "one or more channels"
-        raise InputError(f"{name} are {len(listed)}, for {wanted}: give one for each channel")
-    return listed
+        raise InputError(f"{name} are {len(values)}, for {wanted}: give one for each channel")
+    return tuple(wavelength(f"{name}, number {number},", each) for number, each in enumerate(values, start=1))
 
 
 def as_text(values: Iterable[float]) -> str:
