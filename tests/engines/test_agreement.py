@@ -156,7 +156,8 @@ SLICES = {
 
 @pytest.mark.parametrize("piece", list(SLICES))
 @pytest.mark.parametrize(
-    ("name", "channels"), [("in focus", None), ("mask half-way", 3), ("strong defocus", None), ("strong defocus", 3)]
+    ("name", "channels"),
+    [("in focus", None), ("mask half-way", 3), ("strong defocus", None), ("strong defocus", 3)],
 )
 def test_slices_that_are_not_contiguous(name, channels, piece):
     shape = SHAPE if channels is None else (*SHAPE, channels)
