@@ -83,10 +83,7 @@ def pictures(near, far, focus, ways=("none", "depth")):
     """By some ways; and the truth."""
     sensor = sensor_focused_on(focus)
     camera, lf = vcc.Camera([LENS], sensor), field(near, far)
-    made = {
-        how: camera.capture(lf, between_views=how, interpolation="cubic").values
-        for how in ways
-    }
+    made = {how: camera.capture(lf, between_views=how, interpolation="cubic").values for how in ways}
     return made, truth(near, far, sensor)
 
 
