@@ -24,6 +24,36 @@ if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "mallopt"):
     ctypes.CDLL(None).mallopt(M_TRIM_THRESHOLD, 1 << 30)
 
 
+LONGEST = (
+    "tests/test_pages.py",
+    "tests/engines/test_plans_by_engines.py",
+    "tests/bench/test_in_browser.py",
+    "tests/test_fuzz.py",
+    "tests/engines/test_agreement.py",
+    "tests/run/test_cluster.py",
+    "tests/engines/test_cuda.py",
+    "tests/cli/test_sweep_command.py",
+    "tests/sweeps/test_kept.py",
+    "tests/physics/test_random_cameras.py",
+    "tests/physics/test_diffusers_in_cameras.py",
+    "tests/demo/test_demo.py",
+    "tests/test_notebooks.py",
+)
+"""Files that take longest, or begin processes: the first to be handed out, so that no worker is left with one."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Files are handed out as they are collected, not (as pytest-xdist does) those with most tests first."""
+    if getattr(config.option, "loadscopereorder", False):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of the longest files first."""
+    place = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(LONGEST)))
+
+
 def pytest_collection_finish() -> None:
     """Look for garbage from now on, among what the tests make; not after every 700 objects, as is usual."""
     gc.freeze()

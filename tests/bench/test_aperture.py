@@ -36,7 +36,7 @@ def pictured(shown, light_field):
     return take(shown.train(NOWHERE).train, Field(light_field), shown).values
 
 
-@pytest.mark.parametrize("z", [-0.2, -0.05, 0.0, 0.1])
+@pytest.mark.parametrize("z", [-0.2, 0.0, 0.1])
 def test_what_is_z_before_the_views_is_sharp_where_the_lens_images_it_from_the_camera(z):
     field = flat(0.5)
     places = np.linspace(52, 66, 29) * mm

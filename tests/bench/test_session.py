@@ -513,7 +513,7 @@ ACTIONS = some.one_of(
 
 
 @given(some.lists(ACTIONS, min_size=1, max_size=12))
-@settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 def test_document_and_picture_stay_consistent(actions):
     """After any sequence of messages the last picture is that of the document that was told last."""
     client = Client(offered())
@@ -804,7 +804,7 @@ JUNK = some.recursive(
         max_size=8,
     )
 )
-@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 def test_whatever_comes_is_done_or_refused_in_words(messages):
     """No message ends in a fault of the program, and the bench goes on after each."""
     client = Client()

@@ -66,7 +66,7 @@ def assert_agree(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarra
     return picture
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(1, 5))
 def test_random_cameras(seed):
     shape = SHAPE if seed % 2 else (*SHAPE, 3)
     lf = field(samples(shape, ("float32", "uint8", "uint16")[seed % 3], seed))
@@ -93,7 +93,7 @@ def test_rows_and_columns_that_shear_through_a_mask():
 
 @pytest.mark.parametrize("angle", [0.0, 0.2])
 def test_divided_samples(angle):
-    lf = turned(field(samples((1, 2, 3, 4))), angle)
+    lf = turned(field(samples((1, 2, 2, 3))), angle)
     assert_agree(vcc.Camera([LENS, vcc.Mask(np.eye(3), width=6 * mm, z=20 * mm)], SMALL), lf, refine=2)
 
 
@@ -400,8 +400,10 @@ def test_rays_through_every_step(name):
     assert_rays_agree(small(elements_before(name)), field_of_rays(samples((2, 2, 4, 5))))
 
 
-@pytest.mark.parametrize("channels", [None, 1, 2, 3, 4])
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16"])
+@pytest.mark.parametrize(
+    ("dtype", "channels"),
+    [("uint8", None), ("uint8", 1), ("uint8", 4), ("uint16", 2), ("uint16", 3), ("float16", None), ("float16", 3)],
+)
 def test_types_of_samples_of_rays(dtype, channels):
     shape = (2, 2, 4, 5) if channels is None else (2, 2, 4, 5, channels)
     assert_rays_agree(small(elements_before("cubic plate")), field_of_rays(samples(shape, dtype)), samples=4)

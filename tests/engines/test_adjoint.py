@@ -112,9 +112,10 @@ def test_the_fast_engine_gives_the_same_bits_twice(name, frame):
         np.testing.assert_array_equal(CAMERAS[name].capture(lf, engine="numba").values, first)
 
 
-@pytest.mark.parametrize("frame", [lambda lf: lf, rolled], ids=["straight", "rolled"])
-@pytest.mark.parametrize("refine", ["auto", 2])
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize(
+    ("refine", "frame"), [("auto", lambda lf: lf), (2, rolled)], ids=["straight", "rolled and refined"]
+)
+@pytest.mark.parametrize("name", list(CAMERAS)[:2])
 @pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
 def test_progress_gets_to_the_total_and_never_goes_back(engine, name, refine, frame):
     calls = []

@@ -85,12 +85,13 @@ def as_numpy(values) -> np.ndarray:
 
 
 def assert_engines_agree(camera: vcc.Camera, lf: vcc.LightField, libraries=tuple(LIBRARIES), **options) -> None:
-    expected = camera.capture(lf, engine="reference", **options).values.astype(float)
+    plan = camera.compile(lf, **options)
+    expected = camera.capture(lf, engine="reference", plan=plan).values.astype(float)
     assert expected.any()
-    pictures = {"numba": camera.capture(lf, engine="numba", **options).values}
+    pictures = {"numba": camera.capture(lf, engine="numba", plan=plan).values}
     for name in libraries:
         other = lf.replaced(LIBRARIES[name](np.ascontiguousarray(lf.values)))
-        picture = camera.capture(other, engine="array_api", **options).values
+        picture = camera.capture(other, engine="array_api", plan=plan).values
         assert type(picture) is type(other.values)
         pictures[name] = as_numpy(picture)
     for name, picture in pictures.items():
@@ -99,23 +100,37 @@ def assert_engines_agree(camera: vcc.Camera, lf: vcc.LightField, libraries=tuple
         assert error < 1e-5, f"{name} is off by {error:.1e}"
 
 
+EVERY_LIBRARY = ("in focus", "mask half-way", "strong defocus, masked")
+"""One camera of each way through the engine; JAX compiles each step of each anew, for seconds."""
+
+
 @pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
 @pytest.mark.parametrize("name", list(CAMERAS))
 def test_cameras(name, interpolation):
     # Footprints of different interpolations differ in numbers only: they need the same functions of a library.
-    libraries = tuple(LIBRARIES) if interpolation == "linear" else ("numpy", "torch")
+    libraries = {"nearest": ("numpy",), "linear": ("numpy", "strict", "torch"), "cubic": ("torch",)}[interpolation]
+    if interpolation == "linear" and name in EVERY_LIBRARY:
+        libraries = (*libraries, "jax")
     assert_engines_agree(CAMERAS[name], field(samples()), libraries, interpolation=interpolation)
 
 
-@pytest.mark.parametrize("channels", [None, 1, 3, 4])
-@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float16", "float32", "float64"])
+@pytest.mark.parametrize(
+    ("dtype", "channels"),
+    [
+        *(("uint8", channels) for channels in (None, 1, 3, 4)),
+        *(("float32", channels) for channels in (None, 1, 3, 4)),
+        ("uint16", 3),
+        ("float16", None),
+        ("float64", 4),
+    ],
+)
 def test_types_and_channels(dtype, channels):
     shape = SHAPE if channels is None else (*SHAPE, channels)
     # array-api-strict and JAX are left out: the standard does not require half precision
     libraries = ("numpy", "torch") if dtype == "float16" else tuple(n for n in LIBRARIES if n != "jax")
     # PyTorch's uint16 only stores values
     libraries = tuple(name for name in libraries if (dtype, name) != ("uint16", "torch"))
-    if dtype in ("uint8", "float32") and channels == 3:
+    if (dtype, channels) == ("uint8", 3):
         libraries = (*libraries, "jax")
     assert_engines_agree(CAMERAS["mask half-way"], field(samples(shape, dtype)), libraries)
 
@@ -140,11 +155,13 @@ SLICES = {
 
 
 @pytest.mark.parametrize("piece", list(SLICES))
-@pytest.mark.parametrize("channels", [None, 3])
-@pytest.mark.parametrize("name", ["in focus", "mask half-way", "strong defocus"])
+@pytest.mark.parametrize(
+    ("name", "channels"),
+    [("in focus", None), ("mask half-way", 3), ("strong defocus", None), ("strong defocus", 3)],
+)
 def test_slices_that_are_not_contiguous(name, channels, piece):
     shape = SHAPE if channels is None else (*SHAPE, channels)
-    assert_engines_agree(CAMERAS[name], field(samples(shape))[SLICES[piece]], ("numpy", "torch"))
+    assert_engines_agree(CAMERAS[name], field(samples(shape))[SLICES[piece]], ("torch",))
 
 
 def test_values_in_fortran_order_and_channels_first_in_memory():
@@ -172,17 +189,17 @@ def test_rolled_frames(name, angle, interpolation):
     lf = turned(field(samples()), angle)
     camera = CAMERAS[name]
     assert not camera.compile(lf).core.separable
-    assert_engines_agree(camera, lf, ("numpy", "torch"), interpolation=interpolation)
+    assert_engines_agree(camera, lf, ("torch",), interpolation=interpolation)
 
 
 def test_a_rolled_frame_under_strong_defocus():
-    assert_engines_agree(CAMERAS["strong defocus"], turned(field(samples()), 0.1), ("numpy",))
+    assert_engines_agree(CAMERAS["strong defocus"], turned(field(samples((2, 3, 9, 11))), 0.1), ("numpy",))
 
 
-@pytest.mark.parametrize("library", list(LIBRARIES))
-def test_rolled_frames_on_every_library(library):
+def test_rolled_frames_on_every_library():
     lf = turned(field(samples((*SHAPE, 3))), 0.3)
-    assert_engines_agree(CAMERAS["three masks"], lf, (library,))
+    assert_engines_agree(CAMERAS["three masks"], lf, ("numpy", "strict", "torch"))
+    assert_engines_agree(CAMERAS["mask half-way"], lf[1:2, 1:3], ("jax",))
 
 
 @pytest.mark.parametrize("name", ["in focus", "three masks"])
@@ -205,16 +222,20 @@ def test_a_right_angle_turns_the_picture():
 
 
 @pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic"])
-@pytest.mark.parametrize("refine", [1, 2, 3, 8])
+@pytest.mark.parametrize("refine", [1, 2, 3])
 def test_refined_samples(refine, interpolation):
     camera = CAMERAS["three masks"]
     options = {"refine": refine, "interpolation": interpolation}
-    assert_engines_agree(camera, field(samples()), ("numpy", "torch"), **options)
+    assert_engines_agree(camera, field(samples((2, 3, 9, 11))), ("numpy", "torch"), **options)
+
+
+def test_samples_refined_many_times():
+    assert_engines_agree(CAMERAS["three masks"], field(samples((1, 2, 5, 6))), ("torch",), refine=8)
 
 
 @pytest.mark.parametrize("interpolation", ["linear", "cubic"])
 def test_refined_samples_of_a_rolled_frame(interpolation):
-    lf = turned(field(samples((*SHAPE, 3))), 0.3)
+    lf = turned(field(samples((2, 2, 9, 11, 3))), 0.3)
     options = {"refine": 2, "interpolation": interpolation}
     assert_engines_agree(CAMERAS["three masks"], lf, ("numpy", "torch"), **options)
 

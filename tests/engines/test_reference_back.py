@@ -54,7 +54,7 @@ def assert_adjoint(core: Footprints) -> None:
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_samples_of_random_cameras_are_the_adjoint(kind):
-    for seed in range(3):
+    for seed in range(2):
         case = drawn(kind, seed, 6, 3)
         assert_adjoint(case.camera.compile(case.light_field, refine=1 + seed % 2).core)
 
@@ -116,7 +116,8 @@ def test_numbers_of_turned_and_divided_plans(interpolation, refine):
     )
     assert not core.separable
     assert_adjoint(core)
-    assert_differences(replace(core, opening=0.7))
+    # Each number by itself once; what interpolation changes is met by all of them at once as well.
+    assert_differences(replace(core, opening=0.7), together=interpolation != "cubic")
 
 
 def test_numbers_of_divided_plans():

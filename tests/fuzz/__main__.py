@@ -21,6 +21,7 @@ case again, with its traceback; ``--case "pbrt gz bomb"`` a bomb.
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import itertools
 import sys
@@ -61,6 +62,7 @@ def main() -> int:
     asked = about.parse_args()
     for name in (*LATE, "vcc.store.picture_codec"):
         importlib.import_module(name)
+    gc.freeze()  # children look for garbage among what they make: else each would write to, and copy, all pages
     with rooms() as room:
         run = Run(asked.seed, room, asked.timeout, asked.jobs, asked.report)
         if asked.case:

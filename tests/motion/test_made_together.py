@@ -75,7 +75,7 @@ def sizes(made):
     ("kind", "seed"), [("lenses", 1), ("one mask", 2), ("two masks", 1), ("prisms", 0), ("plate", 1)]
 )
 def test_random_cameras_that_move_are_the_mean_of_still_ones(kind, seed):
-    case, random = drawn(kind, seed, pixels=12, views=7), np.random.default_rng(seed)
+    case, random = drawn(kind, seed, pixels=8, views=5), np.random.default_rng(seed)
     courses = {"sensor.z": Lines([0, EXPOSURE], case.camera.sensor.z + random.uniform(0, 2 * mm, 2))}
     for name, element in keys(case.camera).items():
         if hasattr(element, "decentre"):

@@ -37,8 +37,7 @@ class Axicon(vcc.Element):
         )
 
 
-@pytest.mark.parametrize("engine", ["reference", "numba", "array_api"])
-@pytest.mark.parametrize("z", [0.0, 20 * mm])
+@pytest.mark.parametrize(("z", "engine"), [(0.0, "numba"), (20 * mm, "numba"), (20 * mm, "array_api")])
 def test_a_users_element_equals_the_prism_and_the_mask_that_it_is(engine, z):
     lens = vcc.Lens(focal_length=50 * mm)
 

@@ -47,6 +47,8 @@ DIAMETER = 12 * mm
 PICTURE = vcc.Sensor(z=D, shape=(14, 16), pitch=2.4 * D * SLOPE)
 LENS = vcc.Lens(focal_length=F, diameter=DIAMETER)
 ROUND = Thin(0.0, bend=lens(F), share=disc(DIAMETER))
+RAYS = 56
+"""Squared, the tracer's for each pixel and picture: their noise is measured, and less than `agree` asks for."""
 LIGHT_FIELD_ERROR = 10 ** (-60 / 20)
 """Error of the light field, as a fraction of the image's largest value."""
 
@@ -120,7 +122,7 @@ def test_a_diffuser_conserves_light(rule, kernel):
     assert blurred.values.max() < 0.8 * without.values.max()  # it did scatter
 
 
-@pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
+@pytest.mark.parametrize("kernel", [KERNELS["gaussian"], KERNELS["array"]], ids=["gaussian", "array"])
 def test_rays_through_a_diffuser_conserve_light(kernel):
     lf, camera = in_focus(BLOB), vcc.Camera(RULES["blur of each view"](kernel), WIDE)
     blurred = camera.capture(lf)
@@ -156,8 +158,8 @@ def test_a_diffuser_at_the_sensor_changes_nothing(kernel):
     np.testing.assert_allclose(
         capture([LENS, diffuser], PLANES.light_field, PICTURE).values, without.values, rtol=1e-6
     )
-    rays = capture([LENS, diffuser], PLANES.light_field, PICTURE, method="rays", samples=1024)
-    plain = capture([LENS], PLANES.light_field, PICTURE, method="rays", samples=1024)
+    rays = capture([LENS, diffuser], PLANES.light_field, PICTURE, method="rays", samples=512)
+    plain = capture([LENS], PLANES.light_field, PICTURE, method="rays", samples=512)
     # Two independent errors; the estimate from halves is known to 1/√(2·224) = 5 %.
     error = np.sqrt(np.mean((rays.values - plain.values) ** 2))
     assert error <= 1.2 * np.hypot(rays.sampling_error, plain.sampling_error)
@@ -371,7 +373,7 @@ def test_diffusers_and_masks_match_brute_force(case):
     image = camera.capture(PLANES.light_field, method="rays", samples=8192)
     half = DIAMETER / 2 + spread * D
     bench = Bench([ROUND, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
-    compare(image, *bench.measured(SCENE, 64))
+    compare(image, *bench.measured(SCENE, RAYS))
 
 
 SQUARE_STOP = Thin(0.0, bend=lens(F), share=square(DIAMETER))
@@ -389,7 +391,7 @@ def test_rules_match_brute_force(rule):
     assert any(rule in note for note in camera.compile(PLANES.light_field).notes)
     half = DIAMETER / 2 + spread * D
     bench = Bench([SQUARE_STOP, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
-    truth, noise = bench.measured(SCENE, 64)
+    truth, noise = bench.measured(SCENE, RAYS)
     # What footprints leave besides is second order in cells of views and in samples (test_masks: over 55 dB).
     floor = 10 ** (-55 / 20)
     if rule == "blur of the picture":
@@ -405,7 +407,7 @@ def test_a_stop_behind_a_diffuser_forbids_a_blur_of_the_picture():
     sensor = replace(PICTURE, shape=(20, 20))  # what is left of the scene is coarse
     image = capture([LENS, diffuser, stop], PLANES.light_field, sensor, samples=4096)
     bench = Bench([scattering, hole, ROUND], D, sensor.shape, sensor.pitch, (0.6 * D, 2 * mm, 2 * mm))
-    truth, noise = bench.measured(SCENE, 64)
+    truth, noise = bench.measured(SCENE, RAYS)
     reached = compare(image, truth, noise)
     # The rule applied all the same: the picture without the diffuser, convolved with its kernel. The sensor is
     # taken larger, so that the convolution has all that it needs.
@@ -468,4 +470,4 @@ def test_a_diffuser_before_the_lens_and_behind_its_own_stop_matches_brute_force(
         Thin(z, bend=lens(F), share=disc(9 * mm)),
     ]
     bench = Bench(thins, sensor.z, sensor.shape, sensor.pitch, (z, 4.5 * mm, 4.5 * mm))
-    compare(image, *bench.measured(SCENE, 64))
+    compare(image, *bench.measured(SCENE, RAYS))

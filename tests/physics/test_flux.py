@@ -64,8 +64,9 @@ CAMERAS = {
 }
 
 
-@pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
-@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize(
+    ("interpolation", "engine"), [("linear", "numba"), ("cubic", "numba"), ("cubic", "reference")]
+)
 @pytest.mark.parametrize("name", list(CAMERAS))
 def test_a_sensor_that_catches_everything_records_all_the_light(name, interpolation, engine):
     elements, z = CAMERAS[name]

@@ -133,8 +133,12 @@ def random_camera(seed: int) -> tuple[vcc.LightField, vcc.Camera]:
     return lf, vcc.Camera(elements, vcc.Sensor(d, (12, 15), size / 15))
 
 
-def missing_by_rays(lf: vcc.LightField, camera: vcc.Camera, number: int = 19) -> float:
-    """The share of rays from the sensor through all stops that have no sample, traced one element at a time."""
+def missing_by_rays(lf: vcc.LightField, camera: vcc.Camera, number: int = 17) -> float:
+    """The share of rays from the sensor through all stops that have no sample, traced one element at a time.
+
+    2^17 rays meet borders in 4·2^12.75 boxes: they err by 2^6.4/2^17 = 6e-4, and with the plan's own 2^7/2^17 by
+    1.2e-3 of all rays, within `EVEN`.
+    """
     from scipy.stats import qmc
 
     sensor = camera.sensor
@@ -162,7 +166,7 @@ def missing_by_rays(lf: vcc.LightField, camera: vcc.Camera, number: int = 19) ->
 @pytest.mark.filterwarnings("ignore::vcc.ResultWarning")
 def test_random_cameras_miss_what_rays_miss():
     found = []
-    for seed in range(100):
+    for seed in range(40):
         lf, camera = random_camera(seed)
         plans = [camera.compile(lf, method=method).missing_rays for method in ("footprints", "rays")]
         found.append((*plans, missing_by_rays(lf, camera)))

@@ -279,7 +279,7 @@ def compare(image: vcc.Image, truth: np.ndarray, noise: float, floor: float = LI
 def test_pictures_through_arrays_match_brute_force(case):
     array, thin, gap, reach = CASES[case]
     sensor = vcc.Sensor(z=array.z + gap, shape=(10, 12), pitch=67 * um, decentre=(0.13 * mm, -0.08 * mm))
-    image = vcc.Camera([LENS, array], sensor).capture(PLANES.light_field, samples=16384)
+    image = vcc.Camera([LENS, array], sensor).capture(PLANES.light_field, samples=8192)
     # A sensor point sees the main lens by rays of slope (x_lens − x)/z plus what a lenslet adds, at most
     # how far it is clear from its centre over the shortest focal length.
     steepest = DIAMETER / 2 / array.z + reach / min(np.abs(array.focal_lengths))

@@ -1,7 +1,7 @@
 """The sampling error that an image by rays reports, against its true one, and the resulting warning.
 
-The oracle is brute force: the mean of images of 16 384 rays per pixel and other seeds. Its own error is known
-from their scatter, and is less than a fifth of all errors that are compared with it.
+The oracle is brute force: the mean of images of 8192 rays a pixel and other seeds, whose own error is known from
+their scatter, and is less than a fifth of all that are compared with it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from vcc.plan.rays.points import SCRAMBLES, TABLE, table
 pytestmark = pytest.mark.filterwarnings("ignore:.*not in the light field.*:vcc.errors.ResultWarning")
 
 FOCUS = 1 / (1 / 50e-3 - 1)
-PIXELS, MANY = 16, 2**14
+PIXELS, MANY = 16, 2**13
 
 
 def case(seed: int) -> tuple[vcc.Camera, vcc.LightField]:
@@ -58,15 +58,18 @@ def case(seed: int) -> tuple[vcc.Camera, vcc.LightField]:
 
 @pytest.fixture(scope="module")
 def measured() -> list[tuple[np.ndarray, np.ndarray, float]]:
-    """Of 16 diffusers: true errors and stated ones, by 64, 256 and 1024 rays (rows) and 4 seeds, and the peak."""
+    """Of 12 diffusers: true errors and stated ones, by 64, 256 and 512 rays (rows) and 4 seeds, and the peak.
+
+    As many as there are kinds: what is drawn goes by the number's remainders of 2, 3 and 4.
+    """
     found = []
-    for number in range(16):
+    for number in range(12):
         camera, lf = case(number)
         many = [camera.capture(lf, samples=MANY, seed=900 + n, method="rays") for n in range(2)]
         truth = np.mean([each.values.astype(float) for each in many], axis=0)
         own = np.sqrt(np.mean((many[0].values - truth) ** 2) / 2)
         pairs = np.zeros((2, 3, 4))
-        for row, samples in enumerate((64, 256, 1024)):
+        for row, samples in enumerate((64, 256, 512)):
             for seed in range(4):
                 image = camera.capture(lf, samples=samples, seed=seed, method="rays")
                 pairs[:, row, seed] = np.sqrt(np.mean((image.values - truth) ** 2)), image.sampling_error
@@ -81,7 +84,7 @@ def test_stated_errors_are_the_true_ones(measured):
     With ρ the correlation of their errors, (true / stated)² = (1 + ρ) / (1 − ρ). Points that are evener as a
     whole than their halves have ρ < 0: the error is stated too large. ρ ≤ ½ is required of each picture, so that
     the true one is at most √3 times the stated one; and ρ ≤ 0 on average, to two standard errors of 192 pictures
-    (6 %).
+    (6 %), though these are 144 (7 %).
     """
     ratios = np.stack([true / stated for true, stated, _ in measured])
     assert ratios.max() <= np.sqrt(3)

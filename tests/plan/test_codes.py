@@ -45,8 +45,9 @@ CASES = {
 SHARED = {"lens", "a lens with a rim in the mask's plane", "off axis"}
 
 
-@pytest.mark.parametrize("refine", ["auto", 1])
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("case", "refine"), [*((case, "auto") for case in CASES), *((case, 1) for case in sorted(SHARED))]
+)
 def test_plans_made_together_are_those_made_alone(case, refine, monkeypatch):
     elements, where = CASES[case]
     listed, how, anew = cameras(elements, **where), How(refine=refine if case != "an array" else "auto"), []

@@ -100,8 +100,7 @@ ANY = {
 }
 
 
-@pytest.mark.parametrize("name", ANY)
-@pytest.mark.parametrize("across", ["x", "y"])
+@pytest.mark.parametrize(("name", "across"), list(zip(ANY, itertools.cycle("xy"), strict=False)))
 def test_any_camera_can_be_drawn(name, across, tmp_path):
     axes = Camera(ANY[name], SENSOR).plot(across=across)
     axes.figure.savefig(tmp_path / "camera.png", dpi=30)

@@ -58,11 +58,15 @@ def operator(*channels: int, elements=(LENS, BLURRED), engine="reference", **opt
     return vcc.Camera(list(elements), SENSOR).operator(given, engine=engine, **options)
 
 
-@pytest.mark.parametrize("channels", [(), (3,)])
 @pytest.mark.parametrize(
-    ("engine", "kind", "largest"), [("numba", torch.float32, 1e-6), ("reference", torch.float64, 1e-12)]
+    ("channels", "engine", "kind", "largest", "elements", "options"),
+    [
+        ((), "numba", torch.float32, 1e-6, (LENS, BLURRED), {}),
+        ((3,), "numba", torch.float32, 1e-6, (LENS, LENSLETS), {"samples": 8}),
+        ((3,), "reference", torch.float64, 1e-12, (LENS, BLURRED), {}),
+        ((), "reference", torch.float64, 1e-12, (LENS, LENSLETS), {"samples": 8}),
+    ],
 )
-@pytest.mark.parametrize(("elements", "options"), [((LENS, BLURRED), {}), ((LENS, LENSLETS), {"samples": 8})])
 def test_the_adjoint_is_the_adjoint_to_deepinv(channels, engine, kind, largest, elements, options):
     physics = operator(*channels, elements=elements, engine=engine, **options).as_deepinv()
     torch.manual_seed(0)

@@ -60,8 +60,13 @@ def read(monkeypatch):
     return blocks
 
 
-@pytest.mark.parametrize("how", [How(), How(method="rays", samples=4)], ids=["footprints", "rays"])
-@pytest.mark.parametrize("name", CAMERAS)
+BY_FOOTPRINTS, BY_RAYS = How(), How(method="rays", samples=4)
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [*((name, BY_FOOTPRINTS) for name in CAMERAS), ("places", BY_RAYS), ("of several kinds", BY_RAYS)],
+)
 def test_each_picture_is_that_of_its_camera_and_blocks_are_read_once(stored, in_blocks, read, name, how):  # noqa: F811
     alone = [each.capture(stored, how) for each in CAMERAS[name]]
     by_each = len(read)

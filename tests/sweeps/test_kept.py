@@ -316,7 +316,7 @@ def test_damaged_sweeps_are_refused_or_read(tmp_path):
     whole, damaged, rnd, refused = tmp_path / "sweep.zarr", tmp_path / "damaged.zarr", random.Random(1), []
     vcc.sweep(CAMERA, FIELD, {"sensor.z": "51mm:53mm:3"}, metrics=["sharpness"], output=whole)
     files = sorted(path.relative_to(whole) for path in whole.rglob("*") if path.is_file())
-    for _ in range(200):
+    for _ in range(100):
         shutil.rmtree(damaged, ignore_errors=True)
         shutil.copytree(whole, damaged)
         file = damaged / rnd.choice(files)
@@ -328,7 +328,7 @@ def test_damaged_sweeps_are_refused_or_read(tmp_path):
                     assert swept[n].values.shape == (12, 16, 3)
         except vcc.InputError as error:
             refused.append(str(error))
-    assert len(refused) > 100
+    assert len(refused) > 50
     assert all("damaged.zarr" in said for said in refused)
 
 
