@@ -287,8 +287,7 @@ class Camera(Train):
         """
         check_is_light_field(light_field)
         chosen = How.of(how, options)
-        kinds, photodiodes = self.sensor.pixel_kinds, self.sensor.photodiodes
-        if len(kinds) * len(kinds[0]) > 1 or photodiodes != (1, 1):
+        if self.sensor.has_parts:
             if plan is not None:
                 raise InputError(
                     "a plan is for one image, and this sensor's pixels have several photodiodes or angular "

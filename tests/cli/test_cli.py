@@ -49,6 +49,17 @@ def test_capture_gives_what_the_library_gives(folder):
     assert np.allclose(np.load("upright.npy"), lying[::-1, ::-1], rtol=1e-4, atol=1e-9)
 
 
+def test_photodiodes_are_written_next_to_the_output(folder):
+    (folder / "dual.toml").write_text(CAMERA + "photodiodes = [1, 2]\n[sensor.electronics]\n")
+    for command, output in (("capture", "image.npy"), ("expose", "raw.npy")):
+        result = run(command, "dual.toml", "views", "-o", output, *KNOWN)
+        assert result.exit_code == 0, result.output
+        stem = output.removesuffix(".npy")
+        parts = [np.load(f"{stem}_0_{column}.npy").astype(float) for column in (0, 1)]
+        assert np.allclose(sum(parts), np.load(output), rtol=1e-5)
+        assert not np.allclose(*parts, rtol=1e-2)
+
+
 def test_capture_takes_all_options(folder):
     result = run(
         *("capture", "camera.toml", "views", "-o", "picture.tif", "--interpolation", "cubic"),

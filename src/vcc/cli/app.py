@@ -17,7 +17,8 @@ from vcc.cli.console import notes, say
 
 COMMANDS = {
     "capture": (
-        "Capture the image that a camera records of a light field.",
+        "Capture the image that a camera records of a light field.\n\n"
+        "For a sensor with photodiodes, the image of each is written next to the output, as NAME_ROW_COLUMN.",
         'vcc capture camera.toml views/ -o picture.png --spacing "1 mm"',
         "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
         "vcc capture camera.toml scene.zarr -o picture.exr --executor processes",
@@ -26,7 +27,8 @@ COMMANDS = {
     ),
     "expose": (
         "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"
-        "The camera file describes the sensor in a table sensor.electronics.",
+        "The camera file describes the sensor in a table sensor.electronics. For a sensor with photodiodes, the "
+        "recording of each is written next to the output, as NAME_ROW_COLUMN.",
         'vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1',
         "vcc expose camera.toml views/ -o raw.npy --picture picture.png",
     ),

@@ -1,10 +1,11 @@
 """``vcc capture``: the image that a camera records."""
 
-from vcc.cli.console import check_output, progress, show
+from vcc.cli.console import by_photodiode, check_output, progress, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, Factor, LightFieldFile, Making, Output, Reading
 from vcc.cli.timing import Timing
 from vcc.files.pictures import WRITE_ENDINGS
+from vcc.image import PhotodiodeImage
 from vcc.motion import load_moving_camera
 from vcc.store import StoredVideo
 
@@ -46,11 +47,16 @@ def capture(
             image = moving.capture(
                 field, length, how, start=start, time_tolerance=tolerance, progress=advance, executor=executor
             )
-        elif moving.camera.depends_on_bands:
+        elif moving.camera.depends_on_bands or moving.camera.sensor.has_parts:
             image = moving.camera.capture(field, how, executor=executor, progress=advance)
         else:
             plan = moving.camera.compile(field, how, progress=advance)
             long = field.whole() is None or plan.samples_touched * (field.grid.channels or 1) > WORTH_A_BAR
             bar = advance if long else None
             image = moving.camera.capture(field, how, plan=plan, executor=executor, progress=bar)
-    show(image.save(output, exposure=exposure, upright=not as_recorded).description)
+    saved = image.save(output, exposure=exposure, upright=not as_recorded)
+    show(saved.description)
+    if isinstance(image, PhotodiodeImage):
+        shown = image if as_recorded else image.upright()
+        for path, one in by_photodiode(output, shown.photodiodes):
+            show(one.save(path, exposure=saved.exposure, upright=not as_recorded).description)

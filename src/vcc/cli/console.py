@@ -6,14 +6,16 @@ import os
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from vcc.base.errors import CacheWarning, InputError, ResultWarning
 from vcc.base.progress import Progress
 from vcc.files.atomic import atomic_path
+
+Part = TypeVar("Part")
 
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
@@ -140,6 +142,13 @@ def save_figure(figure: Any, path: Path) -> None:
     with atomic_path(path) as temporary:
         figure.savefig(temporary)
     show(f"{path}: written")
+
+
+def by_photodiode(output: Path, photodiodes: Sequence[Sequence[Part]]) -> Iterator[tuple[Path, Part]]:
+    """What belongs to each photodiode, with the file next to the output that it is written to."""
+    for row, parts in enumerate(photodiodes):
+        for column, part in enumerate(parts):
+            yield output.with_name(f"{output.stem}_{row}_{column}{output.suffix}"), part
 
 
 def check_output(path: Path, endings: tuple[str, ...]) -> Path:

@@ -7,10 +7,11 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
-from vcc.cli.console import check_output, show
+from vcc.cli.console import by_photodiode, check_output, show
 from vcc.cli.executing import Executing
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
+from vcc.recording import PhotodiodeRecording
 
 
 def expose(
@@ -52,6 +53,9 @@ def expose(
             field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how, executor=executor
         )
     show(recording.save(output).description)
+    if isinstance(recording, PhotodiodeRecording):
+        for path, one in by_photodiode(output, recording.photodiodes):
+            show(one.save(path).description)
     if picture is not None:
         mosaic = recording.electronics.color_filter is not None
         show((recording.demosaiced() if mosaic else recording.image()).save(picture).description)

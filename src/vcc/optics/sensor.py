@@ -123,6 +123,12 @@ class Sensor(Shown):
         return ((None if response is None else as_pattern(response),),)
 
     @property
+    def has_parts(self) -> bool:
+        """Whether an image is made of several: of photodiodes, or of pixels that respond by different angles."""
+        kinds = self.pixel_kinds
+        return self.photodiodes != (1, 1) or len(kinds) * len(kinds[0]) > 1
+
+    @property
     def pitches(self) -> tuple[float, float]:
         """The (vertical, horizontal) pixel pitch, metres."""
         if isinstance(self.pitch, tuple | list):
