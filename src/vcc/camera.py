@@ -33,7 +33,7 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import OutputBuffers
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.bands import BandImages, SomeChannels, as_share, bands_as_text, largest_shares, once_each
+from vcc.run.bands import BandImages, SomeChannels, as_share, bands_as_text, largest_shares, once_each, read_once
 from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
@@ -327,6 +327,8 @@ class Camera(Train):
         trains = trains_of(self, grid.channels, grid.wavelengths)
         if self.sensor.response is not None:
             matrix_of(self.sensor.response, grid.channels or 1, grid.wavelengths)  # refused before the work begins
+        if executor is None and len(trains) > 1:
+            light_field = read_once(light_field, how)
         parts, said = [], []
         for number, (same, share) in enumerate(zip(trains, largest_shares(trains), strict=True)):
             part = SomeChannels.of(light_field, same.channels)

@@ -18,15 +18,16 @@ from numpy.typing import NDArray
 
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
+from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.workers import Workers
 from vcc.engines import on_gpu
 from vcc.fields.grid import Block, Grid
 from vcc.fields.sampled import to_numpy
-from vcc.fields.samples import Samples
+from vcc.fields.samples import InMemory, Samples
 from vcc.optics.bands import SameWay
 from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
-from vcc.plan.how import cores
+from vcc.plan.how import How, cores
 from vcc.run.drive import Recorded
 
 
@@ -145,6 +146,21 @@ class BandImages(Brief):
         matrix = matrix_of(self.sensor.response, len(values), self.grid.wavelengths)
         mixed = [sum(band * weight for band, weight in zip(values, row, strict=True)) for row in matrix.tolist()]
         return mixed, matrix @ errors
+
+
+def read_once(samples: Samples, how: How) -> Samples:
+    """Stored samples in memory, where they take a quarter of the memory limit at most; else as they are.
+
+    Args:
+        samples: of which several trains make images.
+        how: its memory limit.
+    """
+    grid = samples.grid
+    size = math.prod(grid.shape) * grid.kind.itemsize
+    if samples.whole() is not None or size > (how.memory_limit or MEMORY_LIMIT) / 4:
+        return samples
+    samples.check_complete()
+    return InMemory.of(samples.read(Block.all_of(grid.shape)), grid)
 
 
 def _copied(values: NDArray[Any], channels: Sequence[int]) -> NDArray[Any]:
