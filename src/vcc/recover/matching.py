@@ -1,7 +1,7 @@
 """Matching of blocks of one image in another, along rows, to a fraction of a pixel.
 
-Blocks are compared by normalised correlation at whole shifts. The best shift is then refined by least squares over shift,
-gain and offset (Lucas and Kanade 1981, with cubic splines between pixels).
+Blocks are compared by normalised correlation at whole shifts. The best shift is then refined by least squares
+over shift, gain and offset (Lucas and Kanade 1981, with cubic splines between pixels).
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ class Matches:
     """The partners of blocks.
 
     Args:
-        shift: pixels from the partner to the block, to the right, shape (block rows, block columns); NaN if no partner is
-            inside the other image.
+        shift: pixels from the partner to the block, to the right, shape (block rows, block columns); NaN if no
+            partner is inside the other image.
         confidence: 0 (no texture, no match, or several equal ones) to 1, same shape.
         lost: blocks without a match, or with the best one at an end of the search, same shape.
     """

@@ -1,10 +1,11 @@
 """Depth from the images of the photodiodes of dual and quad pixels (Garg et al. 2019).
 
-The photodiodes of a pixel see different parts of the exit pupil. Through affine optics a point at the distance Z on the
-axis sends the ray through the place p of the stop to x = p·(A + B/Z)/(1 + e/Z) on the sensor, where e is the place of the
-entrance pupil. The light that a photodiode records has its centroid where p is the mean place p̄ that the photodiode sees.
-So the disparity of two photodiodes is linear in 1/(Z + e), and 0 in focus. For a thin lens with a round opening of radius R at
-the entrance plane, and photodiodes that halve it, the disparity is 8R/(3π) · (1 − d·(1/f − 1/Z)).
+The photodiodes of a pixel see different parts of the exit pupil. Through affine optics a point at the distance Z
+on the axis sends the ray through the place p of the stop to x = p·(A + B/Z)/(1 + e/Z) on the sensor, where e is
+the place of the entrance pupil. The light that a photodiode records has its centroid where p is the mean place p̄
+that the photodiode sees. So the disparity of two photodiodes is linear in 1/(Z + e), and 0 in focus. For a thin
+lens with a round opening of radius R at the entrance plane, and photodiodes that halve it, the disparity is
+8R/(3π) · (1 − d·(1/f − 1/Z)).
 """
 
 from __future__ import annotations
@@ -40,15 +41,15 @@ class PhotodiodeDepth(Brief, Shown):
     """The distances of blocks of the image of the left photodiodes (of the top ones in pixels of one column).
 
     Args:
-        disparity: place of the block in the image of the left (top) photodiodes minus that in the image of the right (bottom)
-            ones, pixels to the right (down) as light lands, shape (block rows, block columns); NaN if a block has no
-            match inside the image.
-        distance: metres before the entrance plane, same shape; infinite for disparities at or beyond that of infinity; NaN
-            if a block has no match, or the best match is at an end of the range.
+        disparity: place of the block in the image of the left (top) photodiodes minus that in the image of the
+            right (bottom) ones, pixels to the right (down) as light lands, shape (block rows, block columns); NaN
+            if a block has no match inside the image.
+        distance: metres before the entrance plane, same shape; infinite for disparities at or beyond that of
+            infinity; NaN if a block has no match, or the best match is at an end of the range.
         confidence: 0 (no texture, no match, or several equal ones) to 1, same shape.
         rows: the row of each block's centre, pixels, shape (block rows,).
-        columns: the column, shape (block columns,). In the sum of the photodiodes a block lies half of its disparity
-            further to the left (up).
+        columns: the column, shape (block columns,). In the sum of the photodiodes a block lies half of its
+            disparity further to the left (up).
     """
 
     disparity: Array
@@ -79,21 +80,21 @@ class PhotodiodeDisparity:
         """From the centroids of the light of points on the axis at three distances, which each photodiode records.
 
         Args:
-            camera: of lenses, prisms, masks and first-order systems, with two or more photodiodes in a pixel. Left and
-                right are the halves of the columns (of an odd number, without the middle one); pixels with one column
-                have the halves of the rows.
+            camera: of lenses, prisms, masks and first-order systems, with two or more photodiodes in a pixel.
+                Left and right are the halves of the columns (of an odd number, without the middle one); pixels
+                with one column have the halves of the rows.
 
         Raises:
-            InputError: one photodiode; elements that bend light otherwise or scatter it; optics that rotate the disparity
-                out of its axis; no stop; or photodiodes that see no part of the pupil, or the same one.
+            InputError: one photodiode; elements that bend light otherwise or scatter it; optics that rotate the
+                disparity out of its axis; no stop; or photodiodes that see no part of the pupil, or the same one.
         """
         halves = _halves(camera.sensor.photodiodes)
         axis = int(camera.sensor.photodiodes[1] > 1)
         for stage in camera.stages:
             if stage.faces.bending is not None or stage.faces.spread is not None:
                 raise InputError(
-                    f"{stage.element.label} makes the disparity of photodiodes no function of distance alone: depth needs a "
-                    "camera of lenses, prisms, masks and first-order systems"
+                    f"behind {stage.element.label} the disparity of photodiodes is not a function of distance "
+                    "alone: depth needs a camera of lenses, prisms, masks and first-order systems"
                 )
         vergences = np.array([1 / 3, 1.0]) / (NEAREST * camera.sensor.z)
         distances = (math.inf, *(1 / vergences))
@@ -102,11 +103,11 @@ class PhotodiodeDisparity:
         largest = np.abs(apart[:, axis]).max()
         if np.abs(apart[:, 1 - axis]).max() > ALONG * largest:
             raise InputError(
-                f"the disparity of the photodiodes does not point along {'yx'[axis]}: the optics rotate the image. Rotate the "
-                "sensor's photodiodes or leave out the rotation"
+                f"the disparity of the photodiodes does not point along {'yx'[axis]}, as the optics rotate the "
+                "image: leave out the rotation"
             )
         far, middle, near = apart[:, axis].tolist()
-        # Δ·(1 + e/Z) = Δ∞ + (factor + e·Δ∞)/Z at both distances.
+        # (Δ − Δ∞)·(1 + e/Z) = factor/Z at both distances.
         steep = (np.array([middle, near]) - far) / vergences
         if not abs(near - middle) > 1e-9 * camera.sensor.z:
             raise InputError("the photodiodes see the same part of the pupil: their images have no disparity")
@@ -118,7 +119,10 @@ class PhotodiodeDisparity:
         return self.at_infinity + self.factor / (distance + self.pupil)
 
     def distance_of(self, disparity: float) -> float:
-        """The distance before the entrance plane, metres: the inverse of `disparity_of`; infinite beyond infinity."""
+        """The distance before the entrance plane, metres: the inverse of `disparity_of`.
+
+        Infinite for the disparity of infinity and beyond.
+        """
         rest = (disparity - self.at_infinity) / self.factor
         return math.inf if rest <= 0 else 1 / rest - self.pupil
 
@@ -137,17 +141,17 @@ def depth_by_photodiodes(
     `vcc.recover.depth_by_biprism`; their disparities become distances by `PhotodiodeDisparity`.
 
     Args:
-        image: a `vcc.image.PhotodiodeImage` as the camera captured it (not upright), a `vcc.recording.PhotodiodeRecording` or its
-            ``image()``; or a piece.
+        image: a `vcc.image.PhotodiodeImage` as the camera captured it (not upright), a
+            `vcc.recording.PhotodiodeRecording` or its ``image()``; or a piece.
         camera: see `PhotodiodeDisparity.of`.
         distance_range: (nearest, farthest) before the entrance plane, metres; infinity is allowed.
         block: side of the blocks, pixels, an odd number.
         step: from block to block, pixels; None uses half a block.
 
     Raises:
-        InputError: an image without photodiodes, of other photodiodes or pixels than the camera's, upright or with NaNs; a
-            recording through a colour filter; an invalid range; an image too small for a block and its partner; or an
-            error of `PhotodiodeDisparity.of`.
+        InputError: an image without photodiodes, of other photodiodes or pixels than the camera's, upright or
+            with NaNs; a recording through a colour filter; an invalid range; an image too small for a block and
+            its partner; or an error of `PhotodiodeDisparity.of`.
 
     Warns:
         ResultWarning: at least 1 % of the blocks match best at an end of the range.
@@ -164,8 +168,8 @@ def depth_by_photodiodes(
     if (count < least).any():
         needed = least if line.axis else least[::-1]
         raise InputError(
-            f"an image of {images[0].shape[0]}×{images[0].shape[1]} pixels is too small for a block of {block} and its "
-            f"partner: {needed[0]}×{needed[1]} are the least. Use a smaller block"
+            f"an image of {images[0].shape[0]}×{images[0].shape[1]} pixels is too small for a block of {block} "
+            f"and its partner: {needed[0]}×{needed[1]} are the least. Use a smaller block"
         )
     rows, columns = (np.arange(half, n - half)[::step] for n in count)
     found = matched((pair[0], pair[1]), Blocks(rows, columns, half), shifts)
@@ -180,12 +184,12 @@ Places = tuple[tuple[int, int], ...]
 
 
 def _halves(photodiodes: tuple[int, int]) -> tuple[Places, Places]:
-    """(row, column) of the photodiodes of the left and right half of a pixel; of top and bottom if it has one column."""
+    """(row, column) of the photodiodes of the left and right half of a pixel; one column: of top and bottom."""
     rows, columns = photodiodes
     if rows * columns == 1:
         raise InputError(
-            "the sensor has one photodiode in a pixel, which has no disparity: give Sensor(photodiodes=(1, 2)), and a "
-            "vcc.Microlens if the camera has no stop"
+            "the sensor has one photodiode in a pixel, which has no disparity: give Sensor(photodiodes=(1, 2)), "
+            "and a vcc.Microlens if the camera has no stop"
         )
     number = columns // 2 if columns > 1 else rows // 2
     places = [(row, column) for row in range(rows) for column in range(columns)]
@@ -204,8 +208,8 @@ def _centroid(camera: Camera, photodiodes: Places, distance: float) -> Array:
         moment += spot.weights @ spot.places
     if not light > 0:
         raise InputError(
-            f"photodiodes {', '.join(map(str, photodiodes))} record no light of a point on the axis: check the pupil_distance "
-            "and the height of the sensor's microlens"
+            f"photodiodes {', '.join(map(str, photodiodes))} record no light of a point on the axis: check the "
+            "pupil_distance and the height of the sensor's microlens"
         )
     return np.asarray(moment[::-1] / light)
 
@@ -216,8 +220,8 @@ def _checked(image: Image | PhotodiodeRecording, camera: Camera) -> tuple[Array,
     if isinstance(image, PhotodiodeRecording):
         if has_mosaic(image.photodiodes[0][0]):
             raise InputError(
-                "the recording has a colour filter: give vcc.image.PhotodiodeImage.of([[each.demosaiced() for each in row] "
-                "for row in recording.photodiodes], camera)"
+                "the recording has a colour filter: give vcc.image.PhotodiodeImage.of([[each.demosaiced() for "
+                "each in row] for row in recording.photodiodes], camera)"
             )
         image = image.image()
     if not isinstance(image, PhotodiodeImage):
@@ -231,9 +235,9 @@ def _checked(image: Image | PhotodiodeRecording, camera: Camera) -> tuple[Array,
     pitches = tuple(np.abs(np.diag(image.frame.linear))[::-1])
     if given != wanted or not np.allclose(pitches, camera.sensor.pitches, rtol=1e-6, atol=0):
         raise InputError(
-            f"the image has {given[0]}×{given[1]} photodiodes in pixels of {pitches[0]:g}×{pitches[1]:g} m, and the camera's "
-            f"sensor {wanted[0]}×{wanted[1]} in {camera.sensor.pitches[0]:g}×{camera.sensor.pitches[1]:g} m: give what this "
-            "camera captured"
+            f"the image has {given[0]}×{given[1]} photodiodes in pixels of {pitches[0]:g}×{pitches[1]:g} m, and "
+            f"the camera's sensor {wanted[0]}×{wanted[1]} in "
+            f"{camera.sensor.pitches[0]:g}×{camera.sensor.pitches[1]:g} m: give what this camera captured"
         )
     numbers = [
         sum(grey(numbers_of(image.photodiodes[row][column], "the image of a photodiode")) for row, column in half)
