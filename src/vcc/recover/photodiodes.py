@@ -32,6 +32,9 @@ CELLS = 256
 """Of the entrance opening, across: the centroid of half a disc is right to 1e-5 of its radius."""
 NEAREST = 10
 """Distance of the nearest point that the line is taken from, over the length of the camera."""
+SMOOTHING = 1.0
+"""Standard deviation of the Gaussian that images are blurred by before they are matched, pixels. Noise is
+smoothest half-way between pixels, so that least squares would prefer disparities there."""
 ALONG = 1e-3
 """Share of a disparity that may point along the other axis."""
 
@@ -85,8 +88,9 @@ class PhotodiodeDisparity:
                 with one column have the halves of the rows.
 
         Raises:
-            InputError: one photodiode; elements that bend light otherwise or scatter it; optics that rotate the
-                disparity out of its axis; no stop; or photodiodes that see no part of the pupil, or the same one.
+            InputError: one photodiode; elements that bend light otherwise or scatter it; optics that turn the
+                disparity away from its axis; no stop; or photodiodes that see no part of the pupil, or the same
+                one.
         """
         halves = _halves(camera.sensor.photodiodes)
         axis = int(camera.sensor.photodiodes[1] > 1)
@@ -103,8 +107,8 @@ class PhotodiodeDisparity:
         largest = np.abs(apart[:, axis]).max()
         if np.abs(apart[:, 1 - axis]).max() > ALONG * largest:
             raise InputError(
-                f"the disparity of the photodiodes does not point along {'yx'[axis]}, as the optics rotate the "
-                "image: leave out the rotation"
+                f"the disparity of the photodiodes does not point along {'yx'[axis]} alone: optics without "
+                "rotational symmetry must stand along the rows and columns of the pixels"
             )
         far, middle, near = apart[:, axis].tolist()
         # (Δ − Δ∞)·(1 + e/Z) = factor/Z at both distances.
@@ -215,7 +219,9 @@ def _centroid(camera: Camera, photodiodes: Places, distance: float) -> Array:
 
 
 def _checked(image: Image | PhotodiodeRecording, camera: Camera) -> tuple[Array, Array]:
-    """The sums over the photodiodes of both halves, grey."""
+    """The sums over the photodiodes of both halves, grey and smoothed."""
+    from scipy.ndimage import gaussian_filter
+
     halves = _halves(camera.sensor.photodiodes)
     if isinstance(image, PhotodiodeRecording):
         if has_mosaic(image.photodiodes[0][0]):
@@ -243,4 +249,5 @@ def _checked(image: Image | PhotodiodeRecording, camera: Camera) -> tuple[Array,
         sum(grey(numbers_of(image.photodiodes[row][column], "the image of a photodiode")) for row, column in half)
         for half in halves
     ]
-    return np.asarray(numbers[0]), np.asarray(numbers[1])
+    left, right = (np.asarray(gaussian_filter(each, SMOOTHING)) for each in numbers)
+    return left, right
