@@ -171,7 +171,7 @@ def _point(vergence: float, width: float) -> LightField:
 
 
 def _spreads(bench: Bench) -> dict[tuple[str, str], PointSpread]:
-    """Point spread functions of the left and the right photodiodes, equally far in front of the focus and behind."""
+    """Point spread functions of both photodiodes, equally far in front of the focus and behind."""
     camera = designed(bench)
     off = 0.8 * min(1 / bench.near - 1 / bench.middle, 1 / bench.middle - 1 / bench.far)
     pitch = bench.diameter * camera.sensor.z * off / PSF_PIXELS
