@@ -106,18 +106,18 @@ def behind_the_lens(case: Case) -> tuple[float, float, float]:
 
 
 CASES = {
-    "dual, lens off the axis": (lambda: drawn("lenses", 1, 12), (1, 2), {}),
+    "dual, lens off the axis": (lambda: drawn("lenses", 1, 8), (1, 2), {}),
     "quad, pupil at 35 mm, crosstalk": (
-        lambda: drawn("lenses", 1, 12),
+        lambda: drawn("lenses", 1, 8),
         (2, 2),
         {"pupil_distance": 35 * mm, "crosstalk": 0.3},
     ),
     "dual, off focus": (lambda: off_focus(True), (1, 2), {}),
     "quad, off focus in front": (lambda: off_focus(False), (2, 2), {}),
     "three by one, off focus, crosstalk": (lambda: off_focus(True), (3, 1), {"crosstalk": 0.1, "f_number": 6.0}),
-    "dual, thick lens, no shift": (lambda: drawn("lenses", 2, 12), (1, 2), {"pupil_distance": np.inf}),
-    "quad, mask against the sensor": (lambda: drawn("one mask", 4, 12), (2, 2), {}),
-    "dual, lenslets, pupil at 60 mm": (lambda: drawn("lenslets", 3, 10), (1, 2), {"pupil_distance": 60 * mm}),
+    "dual, thick lens, no shift": (lambda: drawn("lenses", 2, 8), (1, 2), {"pupil_distance": np.inf}),
+    "quad, mask against the sensor": (lambda: drawn("one mask", 4, 8), (2, 2), {}),
+    "dual, lenslets, pupil at 60 mm": (lambda: drawn("lenslets", 3, 6), (1, 2), {"pupil_distance": 60 * mm}),
 }
 
 

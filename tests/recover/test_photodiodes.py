@@ -168,9 +168,9 @@ def test_two_planes_are_where_they_are(image, electronics):
         assert there.mean() > 0.8
         off = found.disparity[:, columns][there] - disparity(distance) / PITCH
         # Waves of 24 pixels and more in blurs of up to 10 have disparities up to 0.3 % smaller than that of
-        centroids, # and larger ones by up to 3 % if they run across: a third of that and 0.3 % by the cells of
-        views are 0.05. # Noise is 1.4 % of a pixel's mean light, gradients are 1 % a pixel, averaged over 441
-        pixels of both # images: 0.014/0.01·√2/21 = 0.09 root mean square, less by smoothing.
+        # centroids, and up to 3 % larger if they run across: a third of that, and 0.3 % by the cells of views, are
+        # 0.05. Noise is 1.4 % of a pixel's mean light, and gradients are 1 % a pixel, over 441 pixels of both
+        # images: 0.014/0.01·√2/21 = 0.09 root mean square, less by smoothing.
         assert np.quantile(np.abs(off), 0.95) < (0.05 if electronics is None else 0.2)
         assert abs(np.median(off)) < 0.05
         # dZ/Z = Z·dΔ/factor: 0.2 % and 0.4 % for a hundredth of a pixel at NEAR and FAR.

@@ -254,13 +254,14 @@ def _depth_findings(bench: Bench, words: str, found: Found, truth: Array | None,
         median = float(np.median(np.abs(depth.disparity[alone] - expected)))
         bias = float(np.median(depth.disparity[alone])) - expected
         where = f"{away(plane.distance)}, {words}: median error"
+        in_focus = "; in focus both images are the same" if abs(expected) < 0.01 else ""
         yield Finding(
             f"disparity {where}",
             f"{expected:.2f} pixels, within 0.15",
             median,
             "pixels",
             median <= 0.15,
-            f"{np.count_nonzero(alone):,} blocks; their median is off by {bias:+.3f}",
+            f"{np.count_nonzero(alone):,} blocks; their median is off by {bias:+.3f}{in_focus}",
         )
         yield Finding(f"distance {where}", "within 5 %", 100 * off, "%", off <= 0.05)
 
