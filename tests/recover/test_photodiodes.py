@@ -267,5 +267,5 @@ def test_recordings_through_a_colour_filter_raise():
         [[vcc.Image(np.ones((*SENSOR.shape, 3), np.float32), SENSOR.frame) for _ in range(2)]], None
     )
     recording = expose_image(light, replace(SENSOR, electronics=electronics))
-    with pytest.raises(vcc.InputError, match="colour filter.*demosaiced"):
+    with pytest.raises(vcc.InputError, match=r"colour filter.*demosaiced"):
         depth_by_photodiodes(recording, CAMERA, (0.7, 2))
