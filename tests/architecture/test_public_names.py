@@ -32,6 +32,7 @@ NAMES = {
     "vcc.recover.depth": "depth_by_plane_sweep depth_by_structure_tensor disparity_error disparity_maps",
     "vcc.recover.heterodyne": "HeterodyneGeometry decode_heterodyne heterodyne_calibration",
     "vcc.recover.plenoptic": "LensletGrid decode_plenoptic find_lenslets",
+    "vcc.recover.photodiodes": "PhotodiodeDepth PhotodiodeDisparity depth_by_photodiodes",
     "vcc.recover.stereo": "BiprismStereo depth_by_biprism",
     "vcc.sources": "CameraArray DepthMapScene Lighting PlanesScene TexturedPlane Viewpoint blender_script",
     "vcc.sources.mitsuba": "MitsubaRenderer demo_scene",

@@ -16,6 +16,7 @@ from vcc.files.pictures import read_picture
 from vcc.formats.writing import save_light_field
 from vcc.gallery import ENTRIES, Entry, Finding, Picture, Result, entries, entry, extended_depth, write_entry
 from vcc.gallery import biprism_stereo as biprism
+from vcc.gallery import dual_pixel as dual
 from vcc.gallery import integral_lens_prism as integral
 from vcc.gallery import light_field_rendering as rendering
 from vcc.gallery import wavefront_coding as wavefront
@@ -208,6 +209,19 @@ def test_distance_from_one_recording():
     apart = 2 * prism.deflection * (camera.sensor.z - lens.z) / (1 + lens.z) / camera.sensor.pitches[1]
     assert np.median(found.separation[trusted]) == pytest.approx(apart, abs=0.1)
     assert np.median(found.distance[trusted]) == pytest.approx(1.0, rel=0.02)
+
+
+# --- dual pixels ---
+
+
+def test_dual_pixels_run_on_a_light_field_of_one_s_own(light_field):
+    result = dual.Run(block=15, step=12)(bench_for(light_field), silent)
+    assert result.reached
+    slope = next(number for number in result.numbers if number.what.endswith("slope over 1/Z"))
+    bench = bench_for(light_field)
+    # Half discs at the lens, 8R/(3π) apart, and their shadows at d.
+    d = 1 / (1 / bench.focal_length - 1 / bench.middle)
+    assert slope.value == pytest.approx(4 * bench.diameter / (3 * math.pi) * d * 1e6, rel=2e-3)
 
 
 # --- wavefront coding ---

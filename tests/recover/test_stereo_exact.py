@@ -139,11 +139,13 @@ def test_cameras_without_a_baseline_are_none(part):
 
 def test_blocks_are_compared_by_their_normalised_correlation():
     """With all partners that lie in the left half as a whole, two pixels from its border for what splines need."""
-    from vcc.recover.stereo import _correlations
+    from vcc.recover.matching import Blocks, correlations
+    from vcc.recover.stereo import _in_left_half
 
     values = 0.5 + 0.4 * np.random.default_rng(2).random(SENSOR.shape)
     rows, columns, shifts, half = np.array([5, 9, 31]), np.array([300, 333, 351]), np.arange(80, 349), 5
-    found = _correlations(values, rows, columns, shifts, half, MIXED * PITCH, CAMERA)
+    usable = _in_left_half(CAMERA, MIXED * PITCH, half)
+    found = correlations((values, values), Blocks(rows, columns, half), shifts, usable)
     for (n, i, j), here in np.ndenumerate(found):
         partner = columns[j] - shifts[n]
         if partner - half < 2 or partner - 269.5 >= -(MIXED + half + 1):

@@ -19,6 +19,7 @@ from vcc.gallery import (
     coded_aperture_depth,
     coded_aperture_refocusing,
     conventional,
+    dual_pixel,
     heterodyne,
     integral_lens_prism,
     plenoptic,
@@ -74,6 +75,7 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
         (plenoptic.ENTRY, _plenoptic),
         (integral_lens_prism.ENTRY, lambda bench: integral_lens_prism.designed(bench).camera),
         (biprism_stereo.ENTRY, biprism_stereo.designed),
+        (dual_pixel.ENTRY, dual_pixel.designed),
         (wavefront_coding.ENTRY, _wavefront),
     )
 }

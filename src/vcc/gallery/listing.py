@@ -19,6 +19,7 @@ ENTRIES = (
     "angle-sensitive-pixels",
     "integral-lens-prism",
     "biprism-stereo",
+    "dual-pixel",
     "wavefront-coding",
     "diffuser-depth-of-field",
     "focal-sweep",

@@ -43,7 +43,7 @@ from vcc.plan.how import How
 from vcc.plot.camera_plot import plot_camera
 from vcc.plot.element_plot import UNBOUNDED, plot_element
 from vcc.recording import Recording
-from vcc.recover import AllInFocus, Deblurred, DefocusDepth, DepthMap, FocalStack, StereoDepth
+from vcc.recover import AllInFocus, Deblurred, DefocusDepth, DepthMap, FocalStack, PhotodiodeDepth, StereoDepth
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Circle, Pattern
 from vcc.shapes.surface import Surface
@@ -331,8 +331,9 @@ def _(depth: DepthMap) -> Exhibit:
 
 
 @exhibit.register(StereoDepth)
+@exhibit.register(PhotodiodeDepth)
 @exhibit.register(DefocusDepth)
-def _(depth: StereoDepth | DefocusDepth) -> Exhibit:
+def _(depth: StereoDepth | PhotodiodeDepth | DefocusDepth) -> Exhibit:
     panels = (map_panel(depth.distance, "distance [m]"), map_panel(depth.confidence, "confidence"))
     rows, columns = depth.distance.shape
     return Exhibit(type(depth).__name__, f"{rows}×{columns} blocks", panels)

@@ -16,6 +16,7 @@ from vcc.recover.heterodyne import HeterodyneGeometry, decode_heterodyne, hetero
 from vcc.recover.heterodyne_band import band_limited, true_views
 from vcc.recover.lenslet_grid import LensletGrid
 from vcc.recover.lenslet_optics import without_aberration
+from vcc.recover.photodiodes import PhotodiodeDepth, PhotodiodeDisparity, depth_by_photodiodes
 from vcc.recover.plenoptic import decode_plenoptic
 from vcc.recover.refocus import ideal_camera, novel_view, refocused
 from vcc.recover.stereo import BiprismStereo, StereoDepth, depth_by_biprism
@@ -31,6 +32,8 @@ __all__ = [
     "FocalStack",
     "HeterodyneGeometry",
     "LensletGrid",
+    "PhotodiodeDepth",
+    "PhotodiodeDisparity",
     "StereoDepth",
     "band_limited",
     "blurred",
@@ -38,6 +41,7 @@ __all__ = [
     "decode_plenoptic",
     "defocus_kernels",
     "depth_by_biprism",
+    "depth_by_photodiodes",
     "depth_by_plane_sweep",
     "depth_by_structure_tensor",
     "depth_from_defocus",

@@ -9,26 +9,22 @@ to the sensor. Unlike blur, Δ is monotonic in Z: each separation corresponds to
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, warn_of_result
+from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.optics import Biprism, Lens
+from vcc.recover.matching import Blocks, checked_blocks, checked_range, matched, whole_shifts
 from vcc.recover.recorded import grey, numbers_of
 
 Array = NDArray[np.float64]
-
-MANY_ENDED = 0.01
-"""The share of blocks whose search ended at an end of the range from which on a warning is given."""
-_FLOOR = 2e-3  # of the brightest pixel: lower contrast is not texture
-_REFINEMENTS = 6
-_AHEAD = 0.05  # lead in correlation of the best match that gives full confidence
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -139,43 +135,15 @@ def depth_by_biprism(
     """
     stereo, lens = _parts(camera)
     values = _checked(image, camera)
-    near, far = distance_range
-    if not 0 < near <= far:
-        raise InputError(f"distance_range is (nearest, farthest) in metres, greater than 0, not {distance_range}")
-    if not (block >= 5 and block % 2 == 1):
-        raise InputError(f"block is an odd number of pixels, 5 or more, not {block}")
-    step = max(1, block // 2) if step is None else step
+    near, far = checked_range(distance_range)
+    half, step = checked_blocks(block, step)
     pitch = camera.sensor.pitches[1]
-    # One more pixel on either side, so that the best match has neighbours.
-    lowest = math.floor(stereo.separation_of(near) / pitch) - 1
-    highest = math.ceil(stereo.separation_of(far) / pitch) + 1
-    rows, columns, half = _blocks(camera, stereo, lens, block, step, lowest)
-    shifts = np.arange(lowest, highest + 1)
-    correlation = _correlations(values, rows, columns, shifts, half, _mixed(stereo, lens), camera)
-    best = correlation.argmax(axis=0)
-    found = np.isfinite(correlation.max(axis=0))
-    separation, confidence = _refined(values, rows, columns, shifts[best].astype(np.float64), half)
-    at_end = (best == 0) | (best == len(shifts) - 1)
-    lost = ~found | at_end | (np.abs(separation - shifts[best]) > 1.5)
-    confidence *= _distinct(correlation)
-    confidence[lost] = 0
-    separation[~found] = np.nan
-    separation[found & lost] = shifts[best][found & lost]
-    ended = (found & at_end).mean(dtype=np.float64)
-    if ended >= MANY_ENDED:
-        warn_of_result(
-            f"{ended:.1%} of the blocks match best at an end of distance_range: they are outside it, or have no "
-            "texture, and their distance is NaN. Try a wider range"
-        )
-    distance = np.array(
-        [
-            math.nan if is_lost else stereo.distance_of(each * pitch)
-            for each, is_lost in zip(separation.ravel(), lost.ravel(), strict=True)
-        ]
-    )
-    return StereoDepth(
-        separation, distance.reshape(separation.shape), confidence, rows.astype(float), columns.astype(float)
-    )
+    shifts = whole_shifts(stereo.separation_of(near) / pitch, stereo.separation_of(far) / pitch)
+    rows, columns = _blocks(camera, stereo, lens, half, step, int(shifts[0]))
+    usable = _in_left_half(camera, _mixed(stereo, lens), half)
+    found = matched((values, values), Blocks(rows, columns, half), shifts, usable)
+    distance = found.distances(lambda separation: stereo.distance_of(separation * pitch))
+    return StereoDepth(found.shift, distance, found.confidence, rows.astype(float), columns.astype(float))
 
 
 def _parts(camera: Camera) -> tuple[BiprismStereo, Lens]:
@@ -223,11 +191,17 @@ def _mixed(stereo: BiprismStereo, lens: Lens) -> float:
     return abs(1 + a / d - a / lens.focal_length) * lens.diameter / 2 * d / a
 
 
+def _in_left_half(camera: Camera, mixed: float, half: int) -> Callable[[NDArray[np.intp]], NDArray[np.bool_]]:
+    """Whether blocks at columns lie left of the strip that receives light of both halves of the biprism."""
+    places = camera.sensor.column_places
+    reach = mixed + (half + 1) * camera.sensor.pitches[1]
+    return lambda columns: np.asarray(places[np.clip(columns, 0, len(places) - 1)] < -reach)
+
+
 def _blocks(
-    camera: Camera, stereo: BiprismStereo, lens: Lens, block: int, step: int, lowest: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
+    camera: Camera, stereo: BiprismStereo, lens: Lens, half: int, step: int, lowest: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Centres of blocks in the right half of the image whose partner can be in the left half."""
-    half = block // 2
     places = camera.sensor.column_places
     pitch = camera.sensor.pitches[1]
     mixed = _mixed(stereo, lens) + (half + 1) * pitch
@@ -237,93 +211,9 @@ def _blocks(
     rows = np.arange(half, camera.sensor.shape[0] - half)
     if not (rows.size and columns.size):
         raise InputError(
-            f"no block of {block} pixels and its partner lie on the sensor: the two pictures are up to "
+            f"no block of {2 * half + 1} pixels and its partner lie on the sensor: the two pictures are up to "
             f"{widest / pitch:.0f} pixels apart, the strip between them where both mix is "
             f"{2 * _mixed(stereo, lens) / pitch:.0f} pixels wide, and the sensor has {camera.sensor.shape[0]}×"
             f"{camera.sensor.shape[1]}. A narrower lens, a larger sensor or a stronger biprism would do"
         )
-    return rows[::step], columns[::step], half
-
-
-def _correlations(
-    values: Array,
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
-    shifts: NDArray[np.intp],
-    half: int,
-    mixed: float,
-    camera: Camera,
-) -> Array:
-    """Normalised correlation of each block with its partner at each separation; −∞ if there is no partner."""
-    windows = np.lib.stride_tricks.sliding_window_view(values, (2 * half + 1, 2 * half + 1))
-    floor = (_FLOOR * values.max()) ** 2
-    own = _standard(windows[np.ix_(rows - half, columns - half)], floor)
-    places = camera.sensor.column_places
-    reach = (half + 1) * camera.sensor.pitches[1]
-    result = np.full((len(shifts), len(rows), len(columns)), -np.inf)
-    for n, shift in enumerate(shifts):
-        partner = columns - shift
-        # Space for cubic interpolation on the left; the other half is on the right.
-        there = partner - half >= 2
-        there &= places[np.clip(partner, 0, len(places) - 1)] < -(mixed + reach)
-        if there.any():
-            other = _standard(windows[np.ix_(rows - half, partner[there] - half)], floor)
-            result[n][:, there] = np.einsum("rcij,rcij->rc", own[:, there], other)
-    return result
-
-
-def _distinct(correlation: Array) -> Array:
-    """0 if another separation matches as well as the best one (repeated patterns), up to 1 if none does."""
-    padded = np.pad(correlation, ((1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
-    peaks = (correlation >= padded[:-2]) & (correlation >= padded[2:]) & np.isfinite(correlation)
-    heights = np.sort(np.where(peaks, correlation, 0.0), axis=0)
-    ahead = heights[-1] - heights[-2]
-    return np.asarray(np.clip(ahead / _AHEAD, 0, 1))
-
-
-def _standard(blocks: Array, floor: float) -> Array:
-    """Blocks minus their mean, with norm 1 if textured and less without texture."""
-    centred = blocks - blocks.mean(axis=(2, 3), keepdims=True)
-    return np.asarray(centred / np.sqrt((centred**2).sum(axis=(2, 3), keepdims=True) + floor * centred[0, 0].size))
-
-
-def _refined(
-    values: Array, rows: NDArray[np.intp], columns: NDArray[np.intp], separation: Array, half: int
-) -> tuple[Array, Array]:
-    """Separations to a fraction of a pixel, and the share of the blocks that they explain."""
-    from scipy.ndimage import map_coordinates, spline_filter
-
-    window = np.arange(-half, half + 1)
-    down = (rows[:, None, None, None] + window[:, None]).astype(np.float64)
-    across = (columns[:, None, None] + window).astype(np.float64)
-    shape = (len(rows), len(columns), window.size, window.size)
-    down, across = np.broadcast_to(down, shape), np.broadcast_to(across, shape)
-    own = map_coordinates(values, [down, across], order=0).reshape(*shape[:2], -1)
-    own = own - own.mean(axis=2, keepdims=True)
-    spline = spline_filter(values, order=3, mode="mirror")
-
-    def partner(shift: Array) -> Array:
-        places = [down, across - shift[..., None, None]]
-        read = map_coordinates(spline, places, order=3, prefilter=False, mode="mirror").reshape(*shape[:2], -1)
-        return np.asarray(read - read.mean(axis=2, keepdims=True))
-
-    shift = separation.copy()
-    variance = (own**2).mean(axis=2) + (_FLOOR * values.max()) ** 2
-    explained = np.zeros_like(shift)
-    for _ in range(_REFINEMENTS):
-        other = partner(shift)
-        change = (partner(shift + 0.25) - partner(shift - 0.25)) / 0.5
-        # own ≈ gain·(other + ε·change): least squares in gain and gain·ε.
-        oo, cc, oc = (other**2).sum(2), (change**2).sum(2), (other * change).sum(2)
-        yo, yc = (own * other).sum(2), (own * change).sum(2)
-        determinant = oo * cc - oc**2
-        solvable = determinant > 1e-9 * np.maximum(oo * cc, 1e-300)
-        gain, gain_step = (
-            np.divide(each, determinant, out=np.zeros_like(determinant), where=solvable)
-            for each in (yo * cc - yc * oc, yc * oo - yo * oc)
-        )
-        move = np.divide(gain_step, gain, out=np.zeros_like(gain), where=gain > 0)
-        left = ((own - gain[..., None] * other - gain_step[..., None] * change) ** 2).mean(2)
-        explained = np.where(gain > 0, 1 - (left + variance - (own**2).mean(2)) / variance, 0)
-        shift = shift + np.clip(move, -0.5, 0.5)
-    return shift, np.clip(explained, 0, 1)
+    return rows[::step], columns[::step]
