@@ -140,15 +140,17 @@ class AngleSensitive:
         return np.stack(found, axis=1).reshape(self.tiles[1], TILE**2, VIEWS**2)
 
     def decoded(self, image: Image) -> LightField:
-        """The light field at the lens, by least squares in each tile."""
-        stacked = in_tiles(self.radiance(image), self.smoothing)
+        """The light field at the lens, by least squares in each tile, regularised towards equal views."""
+        stacked, mean = in_tiles(self.radiance(image), self.smoothing)
         rows, columns, _, channels = stacked.shape
         found = np.empty((rows, columns, VIEWS**2, channels))
         for row in range(rows):
             a = self.responses(row)
             normal = a.swapaxes(1, 2) @ a
             amount = REGULARISATION * np.trace(normal, axis1=1, axis2=2).mean() / VIEWS**2
-            found[row] = np.linalg.solve(normal + amount * np.eye(VIEWS**2), a.swapaxes(1, 2) @ stacked[row])
+            equal = mean[row][:, None]
+            rest = stacked[row] - a.sum(axis=2)[..., None] * equal
+            found[row] = equal + np.linalg.solve(normal + amount * np.eye(VIEWS**2), a.swapaxes(1, 2) @ rest)
         views = found[::-1, ::-1].reshape(rows, columns, VIEWS, VIEWS, channels).transpose(2, 3, 0, 1, 4)
         return self.light_field(views)
 
@@ -217,7 +219,7 @@ def designed(bench: Bench, most: int) -> AngleSensitive:
     return AngleSensitive(bench, (rows, columns), pitch)
 
 
-def in_tiles(recorded: Array, smoothing: float) -> Array:
+def in_tiles(recorded: Array, smoothing: float) -> tuple[Array, Array]:
     """Interpolate the recording of each pixel of a tile to the tiles' middles.
 
     A tile's pixels lie side by side, and sharp detail differs between them. So half of the photograph is
@@ -229,7 +231,8 @@ def in_tiles(recorded: Array, smoothing: float) -> Array:
         smoothing: standard deviation of a Gaussian, tiles.
 
     Returns:
-        (rows of tiles, columns of tiles, pixels of a tile, channels).
+        (rows of tiles, columns of tiles, pixels of a tile, channels), and the photograph's mean over each tile,
+        without the axis of pixels.
     """
     from scipy import ndimage
 
@@ -245,7 +248,7 @@ def in_tiles(recorded: Array, smoothing: float) -> Array:
         moved = (r - (TILE - 1) / 2) / TILE, (c - (TILE - 1) / 2) / TILE, 0
         there = ndimage.shift(rest[r::TILE, c::TILE], moved, order=3, mode="nearest")
         kinds.append(mean / 2 + ndimage.gaussian_filter(there, (smoothing, smoothing, 0)))
-    return np.stack(kinds, axis=2)
+    return np.stack(kinds, axis=2), mean
 
 
 def photograph(recorded: Array) -> Array:

@@ -181,8 +181,8 @@ class Compared:
             mean["angular noisy"],
             "dB",
             why=f"plenoptic camera at the same exposure time {mean['plenoptic noisy']:.1f} dB: its pixels receive "
-            "twice the light, and decoding does not amplify noise; least squares without smoothing make it "
-            f"{self.camera.noise_gain():.1f} times as strong",
+            "twice the light, and decoding does not amplify noise. Here least squares amplify it "
+            f"{self.camera.noise_gain():.1f} times before smoothing",
         )
         mean_view = np.asarray(self.views["angular"].values, np.float64).mean(axis=(0, 1))
         found = psnr(inner(self.doubled), inner(self.photograph), self.white)
