@@ -130,7 +130,7 @@ def test_each_photodiode_has_the_light_that_its_microlens_sends_there(name):
     image = case.camera.capture(case.light_field, **({"samples": 4096} if case.kind == "lenslets" else {}))
     assert isinstance(image, PhotodiodeImage)
     places = list(itertools.product(*map(range, grid)))
-    truths = {place: Pixels(case, place, pupil).by_rays(case.scene, 1e-3, 16384) for place in places}
+    truths = {place: Pixels(case, place, pupil).by_rays(case.scene, 1e-3, 65536) for place in places}
     peak = max(truth.max() for truth, _ in truths.values())
     for (row, column), (truth, error) in truths.items():
         found = image.photodiodes[row][column].to_numpy()
