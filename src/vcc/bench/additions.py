@@ -293,6 +293,7 @@ MOST_BROUGHT = 2**14
 """Cells of an uploaded image; each state message contains all of them."""
 
 _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
+    "angular_fringes": lambda long, wide: {"frequency": float(f"{12 * long / wide:.2g}")},
     "bounded": lambda long, wide: {
         "pattern": {"name": "cosine_sum", "period": _length(wide / 10, 2)},
         "width": _length(wide, 2),
@@ -301,6 +302,7 @@ _CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
     "by_channel": lambda long, wide: {
         "patterns": [{"name": "circle", "diameter": _length(wide / n, 2)} for n in (1, 1.5, 2)]
     },
+    "gaps": lambda long, wide: {"pitch": _length(wide / 10, 2), "width": _length(wide / 12, 2)},
     "cell_apertures": lambda long, wide: {"lattice": {"layout": "square", "pitch": _length(wide / 10, 2)}},
     "cell_block": lambda long, wide: {
         "lattice": {"layout": "square", "pitch": _length(wide / 10, 2)},
