@@ -23,13 +23,20 @@ EVERYWHERE = {
     r"has it that": "a plain statement",
     r"no number any more": "NaN",
     r"whose way": "a plain statement",
+    r"tells": "report, state, show",
+    r"(?:is|are) told": "is reported",
+    r"(?:is|are) (?:said|asked) (?:of|for)": "a plain statement",
+    r"knows": "a plain statement of what is supported",
+    r"(?:nobody|somebody)": "a plain statement",
+    r"(?:is|are|was|were) looked at": "is read, is evaluated",
+    r"at one time": "at the same time",
+    r"(?:can|to) be had": "is available",
+    r"by itself": "alone",
+    r"it is that": "a plain statement",
+    r"to the bit": "bit for bit",
 }
 """Expressions, and what to write, in pages and in the source."""
 ON_PAGES = {
-    r"tells": "report, state, show",
-    r"(?:is|are) told": "is reported",
-    r"knows": "a plain statement of what is supported",
-    r"(?:nobody|somebody)": "a plain statement",
     r"(?:is|are) answered by": "returns",
     r"takes? for granted": "assumes",
 }

@@ -340,7 +340,7 @@ class Camera(Train):
             found = as_share(found, share)
             sentences = (*cautions.before(), *plan.cautions, *cautions.of(plan, part, found, how))
             bands = bands_as_text(same.channels, grid.wavelengths)
-            if share:  # nothing is said of faint orders
+            if share:  # faint orders give no warnings
                 said.append((found.missing_rays, [(sentence, bands) for sentence in sentences]))
         worst_first = sorted(said, key=lambda each: -each[0])
         _warn_of(once_each(each for _, sentences in worst_first for each in sentences))

@@ -73,7 +73,7 @@ GLASS = vcc.Lens(50 * mm, glass=N_BK7)
         (lambda: light(3, [550, 500, 450]), r"number 1, is 550 m: write 550 \* nm"),
         (lambda: light(3, [550 * nm, 500 * nm]), "are 2, for 3 channels: give one for each"),
         (lambda: light(None, [550 * nm, 500 * nm]), "are 2, for 1 channel:"),
-        (lambda: light(3, [math.nan, 500 * nm, 400 * nm]), "number 1, is nan m: it is that of light"),
+        (lambda: light(3, [math.nan, 500 * nm, 400 * nm]), "number 1, is nan m: give the wavelength of light"),
         (lambda: light(3, 550 * nm), r"are a sequence in metres, such as \[610 \* nm"),
         (lambda: vcc.Camera([GLASS], SENSOR).capture(light()), r"lens at z = 0 mm depends .*with_wavelengths\("),
         (

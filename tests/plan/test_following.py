@@ -313,7 +313,7 @@ def test_rectangles_too_small_and_too_far_apart_for_a_raster_are_looked_at_one_b
 def test_rectangles_beyond_a_raster_that_is_kept_are_refused():
     x, pattern = np.linspace(-0.5, 0.5, 7)[None, :], patterns.as_pattern(hill)
     chosen = choose_mean(pattern, Boxes(x, x.T, 0.3, 0.2))
-    with pytest.raises(vcc.InputError, match="where a pattern is looked at"):
+    with pytest.raises(vcc.InputError, match="where a pattern is evaluated"):
         mean_over(pattern, Boxes(x + 5.0, x.T, 0.3, 0.2), chosen)
 
 

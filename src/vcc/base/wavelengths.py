@@ -36,7 +36,8 @@ def wavelength(name: str, value: Any) -> float:
         return number
     way_out = f": write {value:g} * nm (from vcc.units import nm)" if 100 <= number <= 50e3 else ""
     raise InputError(
-        f"{name} is {value!r} m{way_out or ': it is that of light in metres, 100 nm to 50 µm, such as 550 * nm'}"
+        f"{name} is {value!r} "
+        f"m{way_out or ': give the wavelength of light in metres, 100 nm to 50 µm, such as 550 * nm'}"
     )
 
 

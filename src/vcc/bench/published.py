@@ -82,8 +82,8 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
 """Entries by name, each with a function that designs its camera for a light field before a lens."""
 
 LEFT_OUT: Mapping[str, str] = {
-    "angle-sensitive-pixels": "its pixels respond by a tile of angles, so that an image is made of one for each kind "
-    "of pixel, and the bench shows one: give the sensor of another camera one angular_response",
+    "angle-sensitive-pixels": "its pixels respond by a tile of angles, so that an image is made of one for each "
+    "kind of pixel, and the bench shows one: give the sensor of another camera one angular_response",
     "good-apertures": "it compares many apertures of one lens, and is not a single camera: open "
     "coded-aperture-refocusing, and give its mask other cells",
     "light-field-rendering": "it renders views between those of a light field, and has neither lens nor sensor",

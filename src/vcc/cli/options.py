@@ -235,7 +235,7 @@ class Given:
 @Parameter(name="*", group=READING)
 @dataclass(frozen=True, kw_only=True)
 class ViewCameras(Given):
-    """The cameras of the views, if the user knows more than the files state.
+    """The cameras of the views, for what the files do not state.
 
     Args:
         spacing: Distance between neighbouring views with its unit, "1 mm"; two lengths, "1 mm, 2 mm", are for

@@ -32,7 +32,7 @@ def drawn_sheet(folder: Path, bench: Bench, psnr: dict[str, float], timings: Seq
     rows = [
         (
             f"The light field: {whose}, {nv}×{nu} views of {nt}×{ns} pixels",
-            "Three views of a row, and the slice through all views along the dashed line: slope tells distance.",
+            "Three views of a row, and the slice through all views along the dashed line: slope shows distance.",
             {"light-field-views": ""},
         ),
         (

@@ -1,7 +1,7 @@
 """Gradients of a raster by rays to the plan's parameters, with the compiled kernel, on several threads.
 
 Tiles of the image are divided into groups that do not depend on the number of threads. Each group has its own
-sums, which are added in the order of the groups: the results are the same to the bit for any number of threads.
+sums, which are added in the order of the groups: the results are identical for any number of threads.
 """
 
 from __future__ import annotations

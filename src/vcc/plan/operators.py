@@ -371,7 +371,7 @@ class SharpenViews(Value):
 REACH = 2
 """Samples on each side that affect a sharpened sample."""
 WEIGHT_DIGITS = 10
-"""Weights are integers in units of 2⁻¹⁰: uniform views stay uniform to the bit, and 8-bit samples are exact."""
+"""Weights are integers in units of 2⁻¹⁰: uniform views stay exactly uniform, and 8-bit samples are exact."""
 KEPT_DIGITS = 5
 """Binary digits after the point of 8-bit samples in 16 bits: 2⁻⁵ of a level, sixteen times finer than their
 rounding, with room for values 4 times the range (the filter's are at most 3.4 times)."""

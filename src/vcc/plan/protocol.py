@@ -183,7 +183,7 @@ class Engine(Protocol):
     ) -> Gradient:
         """The gradient of ⟨raster, result of `run`⟩.
 
-        The result is the same to the bit for any number of threads.
+        The result is identical for any number of threads.
 
         Args:
             core: the computation.

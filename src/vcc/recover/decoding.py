@@ -101,7 +101,7 @@ class Decoder:
             if max(geometry.aperture) == math.inf and size > period * (1 + 1e-9):
                 raise InputError(
                     f"nothing bounds the light at the entrance, the views are {short(size)} wide, and the mask "
-                    f"tells them apart over {short(period)}: give the lens a diameter of up to {short(period)}"
+                    f"separates them over {short(period)}: give the lens a diameter of up to {short(period)}"
                 )
         return cls(camera, way, (geometry.views, geometry.views))
 

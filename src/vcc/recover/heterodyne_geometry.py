@@ -172,9 +172,9 @@ class HeterodyneSetup:
             if math.isfinite(opening) and period < opening * (1 - 1e-9):
                 gap = self.camera.sensor.z - self.mask.z
                 raise InputError(
-                    f"the aperture is {short(opening)} wide {way}, and {self.mask.label} tells views apart over "
-                    f"{short(period)}: carriers overlap across the aperture, and opposite views would be taken "
-                    f"for one another. Put the mask {short(gap * period / opening)} or less before the sensor "
+                    f"the aperture is {short(opening)} wide {way}, and {self.mask.label} separates views over "
+                    f"{short(period)}: carriers overlap across the aperture, and opposite views would be "
+                    f"confused. Put the mask {short(gap * period / opening)} or less before the sensor "
                     f"(it stands {short(gap)} before it), take a period of "
                     f"{short(pattern.periods[axis] * opening / period)} or more, or stop the lens down"
                 )

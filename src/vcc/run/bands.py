@@ -215,7 +215,7 @@ def as_share(found: Recorded, share: float) -> Recorded:
 
 
 def once_each(cautions: Iterable[tuple[str, str]]) -> list[str]:
-    """What is said of several bands, once each: sentences that differ in numbers alone are one.
+    """The warnings of several bands, once each: sentences that differ only in numbers are one.
 
     Args:
         cautions: a sentence, and of which bands; what counts most first.

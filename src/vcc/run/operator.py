@@ -307,7 +307,7 @@ class _Unread:
 
     def read(self, block: Block) -> Any:
         """Raise an error: the reverse pass reads no samples if no gradient of a parameter is wanted."""
-        raise AssertionError("samples are looked at")
+        raise AssertionError("samples are read")
 
 
 def _each(

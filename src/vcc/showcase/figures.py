@@ -209,7 +209,7 @@ def views_figure(light_field: LightField) -> Figure:
     put(axes, slice_shown(light_field, row, pixel_row), aspect="auto")
     axes.set_ylabel(f"view 1 … {nu}", fontsize=LABEL, color=INK)
     axes.set_xlabel(
-        "pixels along the dashed line: each thing leaves a straight trace, and its slope tells its distance",
+        "pixels along the dashed line: each object leaves a straight trace, and its slope shows its distance",
         fontsize=LABEL,
         color=INK,
     )

@@ -137,14 +137,14 @@ def put(owner, name, value):
 
 
 def first_of(owner, name, values):
-    """Set a property to the first of some names that this Blender knows."""
+    """Set a property to the first of some names that this Blender supports."""
     for value in values:
         try:
             setattr(owner, name, value)
             return value
         except TypeError:  # what Blender raises for an unknown choice
             continue
-    stop("this Blender knows none of %s for %s" % (", ".join(values), name))
+    stop("this Blender supports none of %s for %s" % (", ".join(values), name))
 
 
 def base_camera(scene):

@@ -150,7 +150,7 @@ class InStore(Results):
                 f"{self.path} keeps no pictures, which {', '.join(wanted)} would need: leave that out, or choose "
                 "another name for the sweep"
             )
-        with self._disk("what is told of pictures"):
+        with self._disk("the numbers of pictures"):
             for name in wanted:
                 if name in self._group:
                     self._group[name][...] = np.nan
@@ -163,7 +163,7 @@ class InStore(Results):
         self.swept = replace(self.swept, numbers=numbers)
 
     def _note(self) -> None:
-        with self._disk("what is told of pictures"):
+        with self._disk("the numbers of pictures"):
             for name, values in self.swept.numbers.items():
                 self._group[name][...] = values
             self._group[DONE][...] = self.swept.done  # last: it declares the rest complete

@@ -203,7 +203,7 @@ class _Cells(Brief):
 
     @property
     def closed(self) -> bool:
-        """Whether the open share of a whole cell is a mean by itself: of one plane, with cells along its axes.
+        """Whether the open share of a whole cell is a single mean: of one plane, with cells along its axes.
 
         The open share through several planes is not the product of their shares. For a rotated cell, the means
         over the rectangles that stand for it come from its parts.

@@ -242,7 +242,7 @@ def check_within(pattern: Pattern, boxes: Boxes, chosen: MeanChoice) -> None:
         low, high = max(centre.min() - length / 2, -bound / 2), min(centre.max() + length / 2, bound / 2)
         tolerance = 1e-9 * raster.length
         if low < high and (low < raster.low - tolerance or high > raster.high + tolerance):
-            raise plan_again("where a pattern is looked at")
+            raise plan_again("where a pattern is evaluated")
 
 
 def _rasters(pattern: Pattern, boxes: Boxes) -> tuple[Raster, Raster] | None:

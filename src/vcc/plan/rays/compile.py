@@ -214,8 +214,8 @@ class ByRays:
             core = core.part(_with(border, grid.in_whole))
             notes.append(
                 f"the light field is a piece of one of {'×'.join(map(str, grid.whole_grid.shape[:4]))} samples: "
-                "it is looked at by the rays of the whole, and fades towards the neighbours that it was cut from, "
-                "so that pictures of pieces add up"
+                "the rays are those of the whole, and it fades towards the neighbours that it was cut from, "
+                "so that images of pieces add up"
             )
         return Plan(
             sensor_shape=self.train.sensor.shape,
