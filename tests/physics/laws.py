@@ -574,7 +574,8 @@ def even_light(case: Case) -> Iterator[Check]:
 
 def flux(case: Case) -> Iterator[Check]:
     """What absorbs nothing loses nothing: a sensor that catches everything counts all the light there is."""
-    absorbing = [e for e in case.camera.elements if isinstance(e, vcc.Mask | vcc.PrismArray | vcc.CodedDiffuser)]
+    by_position = vcc.Mask | vcc.PrismArray | vcc.CodedDiffuser
+    absorbing = [e for e in case.camera.elements if isinstance(e, by_position) or _terms_of(e)]
     kept = [_without_rim(each) for each in case.camera.elements if each not in absorbing]
     field = case.light_field[::3, ::3, ::4, ::4]
     field = field.replaced(np.asarray(field.values, dtype=np.float32) / np.float32(case.light_field.full_scale))
@@ -589,6 +590,10 @@ def flux(case: Case) -> Iterator[Check]:
     shot = capture(vcc.Camera(kept, sensor), field)
     total = shot.values.sum() * pitch**2 / (field.channels or 1)
     yield Check("flux", case.kind, case.seed, abs(float(total / field.flux) - 1), ROUNDING, "all light caught")
+
+
+def _terms_of(element: Any) -> list[Any]:
+    return [term for part in element.parts() if isinstance(part, vcc.Faces) for term in part.terms]
 
 
 def _without_rim(element: Any) -> Any:

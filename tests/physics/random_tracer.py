@@ -769,7 +769,9 @@ class Bench:
         grid = Table(*((low + high) / 2), np.ones((1, 1)), *(high - low))
         self.sheets = [Sheet(_flight(-flown), openings=[grid])]
         here = -flown
-        for element in camera.elements:
+        # In one plane, what transmits by direction comes first.
+        directed = ("AngleFilter", "Louvre", "MaskBehind")
+        for element in sorted(camera.elements, key=lambda one: (one.z, type(one).__name__ not in directed)):
             added = _sheets(element)
             added[0].step = _then(added[0].step, _flight(element.z - here))
             self.sheets += added

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cmp_to_key
@@ -22,7 +22,7 @@ from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.base.values import Value
-from vcc.optics.faces import Element, Faces
+from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
 from vcc.optics.sensor import Sensor
 from vcc.optics.terms import Term
@@ -118,6 +118,39 @@ def _order(one: Element, other: Element) -> int:
     """−1 if light meets ``one`` first, 1 if ``other``: sorted by z, thin elements first in one plane."""
     difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
     return int(np.sign(difference))
+
+
+NOTHING = Faces()
+"""Of an element without an effect."""
+
+
+def met_in_order(elements: Sequence[Element]) -> Iterator[tuple[Element, tuple[Part, ...]]]:
+    """Elements with the parts that light meets in turn; in each plane, terms first.
+
+    Terms depend on the direction of light, so that they do not commute with what bends it in their plane. They act on
+    the light that arrives at the plane, in whichever order elements are listed. Pixels come last in theirs.
+    """
+    listed = [(element, element.parts()) for element in elements]
+    first = 0
+    while first < len(listed):
+        last = first + 1
+        while last < len(listed) and _in_one_plane(listed[last - 1], listed[last]):
+            last += 1
+        plane, first = listed[first:last], last
+        if len(plane) == 1:
+            yield plane[0]
+            continue
+        directed = [(element, part.terms) for element, (part,) in plane if isinstance(part, Faces) and part.terms]
+        yield from ((element, (Faces(terms=terms),)) for element, terms in directed)
+        for element, (part,) in plane:
+            rest = replace(part, terms=()) if isinstance(part, Faces) and part.terms else part
+            if rest is part or rest != NOTHING:
+                yield element, (rest,)
+
+
+def _in_one_plane(one: tuple[Element, tuple[Part, ...]], other: tuple[Element, tuple[Part, ...]]) -> bool:
+    thin = all(element.length == 0 and len(parts) == 1 for element, parts in (one, other))
+    return thin and touch(one[0].z, other[0].z) and not isinstance(other[0], PixelTransmission)
 
 
 def _check_sensor(sensor: object, elements: Any) -> None:
@@ -236,10 +269,10 @@ class Train(Value, Shown):
     def _path(self) -> tuple[tuple[Stage, ...], Affine]:
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
-        for element in (*self.elements, *self._pixels):
+        for element, parts in met_in_order((*self.elements, *self._pixels)):
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
-            for part in element.parts():
+            for part in parts:
                 if isinstance(part, Affine):
                     approach = about(element.decentre, part) @ approach
                     continue
@@ -251,7 +284,7 @@ class Train(Value, Shown):
                     approach, leaving = to_plane.inverse(), stages[-1].leaving
                 if part.terms:
                     part = replace(part, terms=())
-                    if part.deflection is None and part.transmission is None and part.scatter is None:
+                    if part == NOTHING:
                         continue
                 stages.append(Stage(element, here, approach, part, approach @ leaving))
                 approach, leaving = Affine.identity(), stages[-1].leaving

@@ -23,7 +23,7 @@ from vcc.base.errors import InputError
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.fields.samples import InMemory
 from vcc.optics import Scatter
-from vcc.optics.train import Stage, Train, about
+from vcc.optics.train import Stage, Train, about, met_in_order
 from vcc.plot.tracing import marginals
 
 Array = NDArray[np.float64]
@@ -353,11 +353,12 @@ def traced(
 
     yield picture(titles[-1.0], 0.0)
     here = 0.0
-    elements = camera.elements
-    for n, element in enumerate(elements):
+    met = list(met_in_order(camera.elements))
+    elements = [element for element, _ in met]
+    for n, (element, parts) in enumerate(met):
         bundle.move(Affine.propagation(element.z - here))
         here = element.z + element.length
-        for part in element.parts():
+        for part in parts:
             if isinstance(part, Affine):
                 bundle.move(about(element.decentre, part))
             else:

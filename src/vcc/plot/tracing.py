@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.optics import Element, Faces, Scatter
-from vcc.optics.train import Stage, Train, about
+from vcc.optics.faces import Part
+from vcc.optics.train import Stage, Train, about, met_in_order
 from vcc.shapes.kernels import Kernel
 
 Array = NDArray[np.float64]
@@ -63,9 +64,9 @@ class Crossing:
     faces: Faces
 
 
-def crossings(element: Element) -> list[Crossing]:
+def crossings(element: Element, parts: Sequence[Part] | None = None) -> list[Crossing]:
     """The planes of an element in order: one of a thin element; entrance, all faces and exit of a thick one."""
-    parts = element.parts()
+    parts = element.parts() if parts is None else parts
     steps_ahead = sum(isinstance(part, Affine) for part in parts)
     end = element.z + element.length
     found: list[Crossing] = []
@@ -103,10 +104,10 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
     bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [])
     bundle.cross(start, Affine.propagation(start)(given)[:, :2])
     here = 0.0
-    for element in camera.elements:
+    for element, parts in met_in_order(camera.elements):
         bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
         here = element.z + element.length
-        for crossing in crossings(element):
+        for crossing in crossings(element, parts):
             bundle.rays = about(element.decentre, crossing.step)(bundle.rays)
             bundle.cross(crossing.z, bundle.rays[:, :2])
             bundle.meet(Stage(element, crossing.z, Affine.identity(), crossing.faces), split_along)
