@@ -203,7 +203,7 @@ def _findings(found: Recovered) -> tuple[Finding, ...]:
             "",
             noisy - decibels["straight line"],
             "dB",
-            why="the common model does not hold for a prism",
+            why="models with one pixel a band do not fit a prism of glass",
         ),
         Finding(
             "recovered by true shears, rounded to whole pixels: loss",

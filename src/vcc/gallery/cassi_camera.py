@@ -167,7 +167,7 @@ class Imager:
     @property
     @cached
     def recorded_code(self) -> Array:
-        """Transmission of the code as a white scene shows it without the prism, as laboratories calibrate it."""
+        """Transmission of the code as a white scene shows it without the prism."""
         return self.values(np.ones((*self.shape, BANDS)), dispersed=False)
 
     @property
