@@ -2,30 +2,25 @@
 
 Oracles: deepinv's own test of adjoints; the whole matrix, written down, and its problems solved densely; PyTorch's
 gradcheck.
-
-deepinv loads torchvision, whose wheels on PyPI are built for CUDA: beside a torch that is built for the CPU their
-binary does not load. Nothing here uses it; two of its operators have to be declared, which is done below.
 """
 
 from __future__ import annotations
 
 import copy
 import pickle
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
 import torch
 
 import vcc
+from tests import torchvision_declared
 from vcc.base.units import mm
 from vcc.run.operator import Operator
 
 pytestmark = [
     pytest.mark.filterwarnings("ignore::vcc.errors.ResultWarning"),
-    pytest.mark.skipif(
-        not (find_spec("deepinv") and find_spec("torchvision")), reason='needs the extra "deepinv"'
-    ),
+    pytest.mark.skipif(torchvision_declared.MISSING, reason='needs the extra "deepinv"'),
 ]
 
 FOCUS = 1 / (1 / 50e-3 - 1)
@@ -36,20 +31,9 @@ SENSOR = vcc.Sensor(FOCUS, (5, 6), FOCUS * 3e-3)
 SHAPE = (2, 3, 7, 8)
 
 
-DECLARED: list[torch.library.Library] = []
-"""What is declared once stays so."""
-
-
 @pytest.fixture(scope="module", autouse=True)
 def _torchvision():
-    """The operators that torchvision asks for when its binary did not load."""
-    try:
-        import torchvision  # noqa: F401
-    except RuntimeError:
-        declared = torch.library.Library("torchvision", "FRAGMENT")
-        DECLARED.append(declared)
-        for name in ("nms", "qnms"):
-            declared.define(f"{name}(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
+    torchvision_declared.declare()
 
 
 def operator(*channels: int, elements=(LENS, BLURRED), engine="reference", **options) -> Operator:

@@ -39,6 +39,7 @@ THUMBNAILS = {
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "focal-sweep": ("scene-restored", (0, 0.2, 0.5, 0.7)),
     "coded-exposure": ("target", (0.68, 0.53, 1, 0.98)),
+    "cassi": ("scene", (0.338, 0.033, 0.661, 0.492)),
 }
 """Where the first picture has words on it: which one to take, and what part of it (left, top, right, bottom)."""
 DESK = HERE / "data" / "desk.zarr"

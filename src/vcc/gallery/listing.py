@@ -24,6 +24,7 @@ ENTRIES = (
     "diffuser-depth-of-field",
     "focal-sweep",
     "coded-exposure",
+    "cassi",
 )
 """Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which defines an ``ENTRY``."""
 
