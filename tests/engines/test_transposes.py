@@ -112,7 +112,9 @@ def test_random_cameras(kind):
     # Two of the four ways to share out samples for each kind, each with one channel or three: all meet most kinds.
     ways, first = [None, "nearest", "linear", "cubic"], AFFINE.index(kind)
     for seed in (first % 4, (first + 1) % 4):
-        case = drawn(kind, seed + 4 * (kind == "turned mask"), pixels=8, views=4)  # others are black
+        case = drawn(
+            kind, seed + 4 * (kind in ("turned mask", "two terms")), pixels=8, views=4
+        )  # others are black
         options = {} if ways[seed] is None else {"interpolation": ways[seed]}
         core = core_of(case.camera, case.light_field, **options)
         assert core.separable or kind.startswith("turned")

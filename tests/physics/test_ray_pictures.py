@@ -359,7 +359,7 @@ def test_samples_are_doubled_until_the_tolerance_is_reached():
 
 def test_a_tolerance_out_of_reach_is_said():
     sensor = replace(PICTURE, shape=(2, 2))
-    with pytest.warns(ResultWarning, match="the most there are"):
+    with pytest.warns(ResultWarning, match="the maximum; the tolerance"):
         rays(NOISY["cells"], sensor=sensor, tolerance=1e-9, samples=32768)
 
 

@@ -243,7 +243,7 @@ def test_smoothing_keeps_borders_and_outvotes_a_stray_block() -> None:
     np.testing.assert_array_equal(smooth.index, expected)
     np.testing.assert_array_equal(smooth.distance, np.array(away)[expected])
     assert found.index[2, 1] == 4
-    with pytest.raises(vcc.InputError, match="cost is greater than 0"):
+    with pytest.raises(vcc.InputError, match="cost must be greater than 0"):
         found.smoothed(cost=0)
 
 

@@ -208,7 +208,7 @@ def test_what_cannot_be_scattered_is_refused():
     for flown, refused in ((1e-9, False), (1e-3, True)):
         there = given.transformed(Affine.propagation(flown))
         if refused:
-            with pytest.raises(vcc.InputError, match="places of its rays depend on the pixel"):
+            with pytest.raises(vcc.InputError, match="positions of its rays depend on the pixel"):
                 there.scattered(still)
         else:
             np.testing.assert_allclose(there.scattered(still).values, given.scattered(still).values, atol=1e-5)

@@ -279,7 +279,9 @@ class Exhausted(Unread):
 def test_memory_that_runs_out_is_told(monkeypatch):
     given = light_field()
     plan = camera().compile(given)
-    with pytest.raises(vcc.InputError, match=r"ran out within memory_limit=123456789 bytes: there is less"):
+    with pytest.raises(
+        vcc.InputError, match=r"ran out within memory_limit=123456789 bytes: less than that is available"
+    ):
         drive(plan, Exhausted(given), How(memory_limit=123456789))
     # In memory no limit is the reason.
     run = Drive(plan, given, How())
