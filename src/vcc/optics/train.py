@@ -127,8 +127,8 @@ NOTHING = Faces()
 def met_in_order(elements: Sequence[Element]) -> Iterator[tuple[Element, tuple[Part, ...]]]:
     """Elements with the parts that light meets in turn; in each plane, terms first.
 
-    Terms depend on the direction of light, so that they do not commute with what bends it in their plane. They act on
-    the light that arrives at the plane, in whichever order elements are listed. Pixels come last in theirs.
+    Terms depend on the direction of light, so they do not commute with what bends it in their plane. They act on
+    the the light that arrives at the plane, in whichever order elements are listed. Pixels come last in theirs.
     """
     listed = [(element, element.parts()) for element in elements]
     first = 0
