@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
 
 Array = NDArray[np.float64]
@@ -42,8 +43,8 @@ class Blocks:
     half: int
 
 
-@dataclass(frozen=True, eq=False)
-class Matches:
+@dataclass(frozen=True, eq=False, repr=False)
+class Matches(Brief):
     """The partners of blocks.
 
     Args:
