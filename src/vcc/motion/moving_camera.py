@@ -212,7 +212,7 @@ class MovingCamera(Brief):
 
         Warns:
             ResultWarning: the tolerance was not reached; also the warnings of `vcc.Camera.capture`, once for
-            each kind.
+                each kind.
 
         Raises:
             InputError: an exposure below 0, a video that is too short, a transmission of the shutter below 0
