@@ -175,10 +175,8 @@ class Camera(Train):
         Specify the sensor by ``pixels_per_lenslet`` and ``lenslets``, or by ``sensor_size`` and ``pixel_pitch``.
 
         Decoding uses views one pixel apart, counted from the middle of a micro-image, and no pixel that two
-        micro-images
-        share: n pixels across give 1 + 2·floor((n − 1)/2) views along each axis. 9 pixels give 9×9 views, 4
-            pixels give
-        3×3. `vcc.recover.Decoder.of(camera).views` returns their number.
+        micro-images share: n pixels across give 1 + 2·floor((n − 1)/2) views along each axis. 9 pixels give 9×9
+        views, 4 pixels give 3×3. `vcc.recover.Decoder.of(camera).views` returns their number.
 
         Args:
             focal_length: of the main lens, metres.

@@ -24,10 +24,8 @@ class AngleFilter(Element):
     """A filter that transmits by direction: the pattern of a mask, as a function of slopes in place of positions.
 
     A length of 1 m in the pattern is a slope of 1. So ``AngleFilter(patterns.Circle(2 * math.tan(angle)))`` is a
-    stop at
-    infinity: it passes light within ``angle`` of the axis. The filter acts on the arriving ray, before its
-        neighbours in
-    the same plane bend light.
+    stop at infinity: it passes light within ``angle`` of the axis. The filter acts on the light that arrives at
+    its plane, before other elements of the plane bend it.
 
     Args:
         pattern: transmission, 0 to 1, by slopes (s, t): a `vcc.patterns.Pattern`, or a function of two arrays.

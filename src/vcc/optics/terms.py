@@ -1,5 +1,4 @@
-"""Transmission by direction: patterns of affine functions of the ray, and how each becomes a mask at another
-plane.
+"""Transmission by direction: patterns of affine functions of the ray, each a mask in a plane of its own.
 
 A transmission is a product of terms g(A·(x, y, s, t)). Completed to an invertible map of rays, A leads to a plane
 in which the term is an ordinary mask, and its inverse leads back. So plans, gradients and drawings treat a term as

@@ -128,7 +128,7 @@ def met_in_order(elements: Sequence[Element]) -> Iterator[tuple[Element, tuple[P
     """Elements with the parts that light meets in turn; in each plane, terms first.
 
     Terms depend on the direction of light, so they do not commute with what bends it in their plane. They act on
-    the the light that arrives at the plane, in whichever order elements are listed. Pixels come last in theirs.
+    the light that arrives at the plane, in whichever order elements are listed. Pixels come last in theirs.
     """
     listed = [(element, element.parts()) for element in elements]
     first = 0
