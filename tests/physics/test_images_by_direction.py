@@ -197,3 +197,28 @@ def test_each_photodiode_is_recorded_with_noise_of_its_own():
     deep = vcc.Camera([LENS], sensor(photodiodes=(1, 2), electronics=vcc.Electronics(bit_depth=16)))
     with pytest.raises(vcc.InputError, match="bit_depth of 15"):
         deep.expose(light_field, 1e-5)
+
+
+def test_a_lens_of_glass_fringes_and_photodiodes_together():
+    # Cauchy's n = A + B/λ²: by hand f ∝ 1/(n − 1), so that each band is out of focus in its own way.
+    bands = np.array([450.0, 640.0]) * 1e-9
+    index = {band: 1.5046 + 0.0042e-12 / band**2 for band in (*bands, 587.5618e-9)}
+    glass = vcc.glasses.Cauchy(1.5046, 0.0042e-12)
+    lens = vcc.Lens(50 * mm, diameter=7 * mm, decentre=LENS.decentre, glass=glass)
+    pixels = sensor(photodiodes=(1, 2), angular_response=AngularFringes(25.0, 0.3, 0.9))
+    grey = textured_field()
+    light_field = vcc.LightField(np.stack([grey.values, grey.values], axis=-1), grey.frame, sample="point")
+    image = vcc.Camera([lens], pixels).capture(light_field.with_wavelengths(bands)).photodiodes
+    for n, band in enumerate(bands):
+        power = (index[band] - 1) / (index[587.5618e-9] - 1)
+        thin = vcc.Lens(50 * mm / power, diameter=7 * mm, decentre=LENS.decentre)
+        plain = vcc.Camera([thin], sensor())
+
+        def left(rays):
+            pupil = rays[..., 0] - 54 * mm * rays[..., 2]  # the right half of the lens
+            return fringes(rays) * (pupil >= LENS.decentre[0])
+
+        truth = summed(plain, left, scene, across=96)
+        assert decibels(image[0][0].to_numpy()[..., n], truth) > 50
+        truth = summed(plain, fringes, scene, across=96) - truth
+        assert decibels(image[0][1].to_numpy()[..., n], truth) > 50
