@@ -313,7 +313,12 @@ class Camera(Train):
         if executor is None and progress is None and cameras[0].sensor.photodiodes == (1, 1):
             images = captured_in_batches(cameras, light_field, how)
         else:
-            images = [camera.capture(light_field, how, executor=executor, progress=progress) for camera in cameras]
+            images = [
+                camera.capture(
+                    light_field, how, executor=executor, progress=part_of(progress, number, len(cameras))
+                )
+                for number, camera in enumerate(cameras)
+            ]
         tile = [images[row * columns : (row + 1) * columns] for row in range(rows)]
         return interleaved(tile, self) if alternate else PhotodiodeImage.of(tile, self)
 

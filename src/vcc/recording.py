@@ -216,6 +216,15 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
         image: irradiance, not upright.
         exposure: the settings of the recording.
     """
+    rows = image.photodiodes if isinstance(image, PhotodiodeImage) else ((image,),)
+    if (len(rows), len(rows[0])) != exposure.sensor.photodiodes:
+        of_image, of_sensor = (
+            "×".join(map(str, grid)) for grid in ((len(rows), len(rows[0])), exposure.sensor.photodiodes)
+        )
+        raise InputError(
+            f"this is the image of {of_image} photodiodes in a pixel, and the sensor has {of_sensor}, each with "
+            "its own electronics: use camera.expose, or the image that camera.capture returns for this sensor"
+        )
     if isinstance(image, PhotodiodeImage):
         return _recorded_by_photodiodes(image, exposure)
     if not image.inverted:

@@ -163,6 +163,14 @@ def test_parts_of_pixels_that_do_not_exist_raise(given, message):
         given()
 
 
+def test_pixels_come_last_in_whichever_order_elements_are_listed():
+    one = camera(vcc.Lens(80 * mm, z=52 * mm, name="field lens"), photodiodes=(1, 2)).photodiode(0, 1)
+    other = vcc.Camera(one.elements[::-1], one.sensor)
+    assert [element.kind for element in other.elements] == ["lens", "lens", "pixel transmission"]
+    for stage, same in zip(one.stages, other.stages, strict=True):
+        np.testing.assert_array_equal(stage.arriving.matrix, same.arriving.matrix)
+
+
 def test_an_infinite_pupil_distance_shifts_no_microlens():
     far = camera(photodiodes=(1, 2), microlens=vcc.Microlens(pupil_distance=math.inf))
     rays = np.array([[0.3 * mm, 0, 0.01, 0], [0.3 * mm, 0, -0.01, 0]])

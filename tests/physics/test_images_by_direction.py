@@ -194,6 +194,11 @@ def test_each_photodiode_is_recorded_with_noise_of_its_own():
     truth = camera.capture(light_field).to_numpy()
     noise = np.std([each.irradiance() for each in recordings], axis=0) / math.sqrt(len(recordings))
     assert np.abs((mean - truth) / noise).max() < 5
+    whole = vcc.Camera([LENS], sensor()).capture(light_field)
+    with pytest.raises(vcc.InputError, match=r"image of 1×1 photodiodes in a pixel, and the sensor has 1×2"):
+        vcc.expose_image(whole, camera.sensor, 4e-7)
+    with pytest.raises(vcc.InputError, match=r"image of 1×2 photodiodes in a pixel, and the sensor has 1×1"):
+        vcc.expose_image(camera.capture(light_field), sensor(electronics=electronics), 4e-7)
     deep = vcc.Camera([LENS], sensor(photodiodes=(1, 2), electronics=vcc.Electronics(bit_depth=16)))
     with pytest.raises(vcc.InputError, match="bit_depth of 15"):
         deep.expose(light_field, 1e-5)

@@ -34,11 +34,10 @@ def wavelength(name: str, value: Any) -> float:
         number = float("nan")
     if SHORTEST <= number <= LONGEST:
         return number
-    way_out = f": write {value:g} * nm (from vcc.units import nm)" if 100 <= number <= 50e3 else ""
-    raise InputError(
-        f"{name} is {value!r} "
-        f"m{way_out or ': give the wavelength of light in metres, 100 nm to 50 µm, such as 550 * nm'}"
-    )
+    way_out = "give the wavelength of light in metres, 100 nm to 50 µm, such as 550 * nm"
+    if 100 <= number <= 50e3:
+        way_out = f"write {value:g} * nm (from vcc.units import nm)"
+    raise InputError(f"{name} is {value!r} m: {way_out}")
 
 
 def wavelengths(name: str, values: Any, count: int | None = None) -> tuple[float, ...]:
@@ -60,6 +59,18 @@ def wavelengths(name: str, values: Any, count: int | None = None) -> tuple[float
         wanted = f"{count} channel{'' if count == 1 else 's'}" if count else "one or more channels"
         raise InputError(f"{name} are {len(values)}, for {wanted}: give one for each channel")
     return tuple(wavelength(f"{name}, number {number},", each) for number, each in enumerate(values, start=1))
+
+
+def rising(name: str, values: Any) -> tuple[float, ...]:
+    """Wavelengths of a table, metres: as `wavelengths`, two or more in rising order.
+
+    Raises:
+        InputError: as `wavelengths`; fewer than two, or not rising.
+    """
+    places = wavelengths(name, values)
+    if len(places) < 2 or any(np.diff(places) <= 0):
+        raise InputError(f"{name} are two or more, and rise")
+    return places
 
 
 def as_text(values: Iterable[float]) -> str:

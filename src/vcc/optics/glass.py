@@ -8,13 +8,11 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from vcc.base import checks
 from vcc.base.describe import kind_in_words, parameters_in_words, with_parameters
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
-from vcc.base.wavelengths import LONGEST, SHORTEST
+from vcc.base.wavelengths import LONGEST, SHORTEST, rising
 from vcc.base.wavelengths import wavelength as checked
 from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.optics.catalogues import Glasses, cauchy_through, makers
@@ -187,9 +185,7 @@ class Table(Glass):
     indices: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        places = all_checked("wavelengths of a table of indices", self.wavelengths)
-        if len(places) < 2 or any(np.diff(places) <= 0):
-            raise InputError("wavelengths of a table of indices are two or more, and rise")
+        places = rising("wavelengths of a table of indices", self.wavelengths)
         given = checks.array("indices of a table", self.indices, "one for each wavelength", len(places))
         object.__setattr__(self, "wavelengths", places)
         object.__setattr__(self, "indices", tuple(given.tolist()))

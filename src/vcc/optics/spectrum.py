@@ -11,7 +11,7 @@ import numpy as np
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
-from vcc.base.wavelengths import wavelengths as all_checked
+from vcc.base.wavelengths import rising
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,7 @@ class Spectrum(Shown):
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        places = all_checked("wavelengths of a spectrum", self.wavelengths)
-        if len(places) < 2 or any(np.diff(places) <= 0):
-            raise InputError("wavelengths of a spectrum are two or more, and rise")
+        places = rising("wavelengths of a spectrum", self.wavelengths)
         given = checks.array("values of a spectrum", self.values, "one for each wavelength", len(places))
         checks.none_negative("values of a spectrum", given)
         object.__setattr__(self, "wavelengths", places)

@@ -115,9 +115,11 @@ def _place(z: float) -> str:
 
 
 def _order(one: Element, other: Element) -> int:
-    """−1 if light meets ``one`` first, 1 if ``other``: sorted by z, thin elements first in one plane."""
-    difference = one.length - other.length if touch(one.z, other.z) else one.z - other.z
-    return int(np.sign(difference))
+    """−1 if light meets ``one`` first, 1 if ``other``: by z; in one plane thin elements first, pixels last."""
+    if not touch(one.z, other.z):
+        return int(np.sign(one.z - other.z))
+    pixels = isinstance(one, PixelTransmission) - isinstance(other, PixelTransmission)
+    return pixels or int(np.sign(one.length - other.length))
 
 
 NOTHING = Faces()
