@@ -97,6 +97,7 @@ def test_terms_of_other_forms_raise(of, message):
         (lambda: vcc.AngleFilter(np.ones((3, 3))), r"Cells\(array, width=2"),
         (lambda: vcc.Louvre(1 * mm, 1 * mm, 1 * mm), "thinner than the pitch"),
         (lambda: vcc.Louvre(0, 1 * mm), "pitch"),
+        (lambda: camera(vcc.Louvre(1 * mm, 20 * mm, z=40 * mm)), "ends at z = 60 mm, behind the sensor"),
         (lambda: AngularFringes(3.0, modulation=2.0), "between 0 and 1"),
         (lambda: sensor(photodiodes=(0, 2)), "photodiodes"),
         (lambda: sensor(microlens=vcc.Microlens()), "one photodiode"),

@@ -438,7 +438,7 @@ class _Drawing:
     def _louvre(self) -> Any:
         z = self.lens_z + self.between(0.0, 0.9) * (self.sensor.z - self.lens_z)
         pitch = self.between(0.3, 1.5) * self._beam(z)
-        height = pitch * self.between(0.3, 1.2) / self._directions()[0]
+        height = min(pitch * self.between(0.3, 1.2) / self._directions()[0], self.sensor.z - z)
         wall = pitch * self.one_of(0.0, self.between(0, 0.4))
         turn = self.one_of(0.0, self.between(0, 3))
         return vcc.Louvre(pitch, height, wall, turn, z=z, decentre=self.off_axis(0.5 * pitch))

@@ -210,7 +210,7 @@ _NEW: Mapping[str, Callable[[float, float], Json]] = {
     "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
     "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
     "lens_array": lambda long, wide: {"pitch": _length(wide / 40, 2), "focal_length": _length(long / 50, 2)},
-    "louvre": lambda long, wide: {"pitch": _length(wide / 10, 2), "height": _length(long / 4, 2)},
+    "louvre": lambda long, wide: {"pitch": _length(wide / 10, 2), "height": _length(long / 20, 2)},
     "mask": lambda long, wide: {"pattern": {"name": "circle", "diameter": _length(wide / 2, 2)}},
     "phase_plate": lambda long, wide: {
         "surface": {"name": "cubic", "strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},

@@ -62,7 +62,8 @@ class Louvre(Element):
     A ray passes if it enters and leaves through the same gap. Across the walls, with gaps of width g = pitch −
     wall, the mean transmission over all places is max(0, g − height·|s|)/pitch.
 
-    The walls begin at z and end at z + height. Other elements may stand there: the louvre counts as thin.
+    The walls begin at z and end at z + height, at the sensor at most. Other elements may stand there: the louvre
+    counts as thin.
 
     Args:
         pitch: from wall to wall, metres.
@@ -88,6 +89,11 @@ class Louvre(Element):
                 f"wall of {self.label} is {self.wall * 1e3:g} mm: walls are 0 or thicker, and thinner than the "
                 f"pitch of {self.pitch * 1e3:g} mm"
             )
+
+    @property
+    def occupied_length(self) -> float:
+        """The height of the walls, metres."""
+        return self.height
 
     def faces(self) -> Faces:
         """One factor: the gaps, as a function of the place across the walls and the way across them, height·s."""

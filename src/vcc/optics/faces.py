@@ -155,6 +155,11 @@ class Element(Shown, abc.ABC):
         """Extent of the element along the axis from z on, metres; 0 for a thin one."""
         return 0.0
 
+    @property
+    def occupied_length(self) -> float:
+        """Extent of the body behind z, metres: `length`, or more for a body whose optics count as thin."""
+        return self.length
+
     def parts(self) -> tuple[Part, ...]:
         """The parts that light meets in order, in coordinates centred on the element: a thin one's faces alone.
 

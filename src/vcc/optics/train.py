@@ -245,10 +245,10 @@ class Train(Value, Shown):
                     f"{element.label} (z = {element.z * 1e3:g} mm) stands behind the sensor "
                     f"(z = {sensor.z * 1e3:g} mm): light never reaches it"
                 )
-            if element.z + element.length > sensor.z and not touch(element.z + element.length, sensor.z):
+            end = element.z + element.occupied_length
+            if end > sensor.z and not touch(end, sensor.z):
                 raise InputError(
-                    f"{element.label} ends at z = {(element.z + element.length) * 1e3:g} mm, behind the sensor "
-                    f"at z = {sensor.z * 1e3:g} mm"
+                    f"{element.label} ends at z = {end * 1e3:g} mm, behind the sensor at z = {sensor.z * 1e3:g} mm"
                 )
         if sensor.z < 0:
             raise InputError(f"the sensor stands before the entrance plane: z = {sensor.z * 1e3:g} mm")

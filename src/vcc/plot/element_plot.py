@@ -103,7 +103,7 @@ def _traced(element: Element, bundle: np.ndarray, half: float, axis: int) -> Pat
     """Rays through the element and behind it, until their change of slope is visible."""
 
     def through(room: float) -> Paths:
-        sensor = Sensor(z=element.length + room, shape=(1, 1), pitch=1.0)
+        sensor = Sensor(z=element.occupied_length + room, shape=(1, 1), pitch=1.0)
         return trace(Train([element], sensor), bundle, -half, split_along=axis)
 
     one = through(half)
