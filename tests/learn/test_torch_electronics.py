@@ -175,3 +175,13 @@ def test_what_cannot_be_recorded_is_refused(change, said):
     given = {"picture": torch.ones(40, 50), "sensor": SENSOR, "exposure": TIME, **change}
     with pytest.raises(vcc.InputError, match=said):
         expose(**given)
+
+
+def test_photodiodes_are_exposed_one_by_one():
+    lens = vcc.Lens(0.05, diameter=0.008)
+    sensor = vcc.Sensor(0.052, (4, 5), 1e-5, electronics=vcc.Electronics(), photodiodes=(1, 2))
+    light = torch.full((4, 5), 1e-3)
+    with pytest.raises(vcc.InputError, match=r"1×2 photodiodes in a pixel.*camera\.photodiode"):
+        expose(light, sensor, 1 * ms)
+    one = vcc.Camera([lens], sensor).photodiode(0, 1).sensor
+    assert expose(light, one, 1 * ms, noise=False).shape == (4, 5)

@@ -82,6 +82,11 @@ def exposed(
 ) -> torch.Tensor:
     """Like `expose`, with any sensitive area of the pixels, m², a tensor or a number."""
     electronics = electronics_of(sensor)
+    if sensor.photodiodes != (1, 1):
+        raise InputError(
+            f"this sensor has {'×'.join(map(str, sensor.photodiodes))} photodiodes in a pixel, each with its own "
+            "electronics: expose the image of each by camera.photodiode(row, column).sensor"
+        )
     seconds = _above_zero("exposure", exposure)
     radiance = checks.above_zero("radiance", radiance, unit="W/(m²·sr)")
     light, channel = _filtered(picture, sensor, electronics)
