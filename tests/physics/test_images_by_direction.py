@@ -167,6 +167,18 @@ def test_photodiodes_add_up_to_the_ordinary_image(method):
         np.testing.assert_allclose(image.sum().to_numpy(), whole, atol=allowed * whole.max())
 
 
+def test_images_of_photodiodes_keep_their_order_and_name_their_axes():
+    image = vcc.Camera([LENS], sensor(photodiodes=(1, 2))).capture(textured_field())
+    left, right = (one.to_numpy() for one in image.photodiodes[0])
+    named = image.to_xarray()
+    assert named.dims == ("photodiode_y", "photodiode_x", "y", "x")
+    np.testing.assert_array_equal(named.values[0], [left, right])
+    np.testing.assert_array_equal(image[1:3].photodiodes[0][1].to_numpy(), right[1:3])
+    turned = image.upright()  # what lies on the left then was on the right
+    np.testing.assert_array_equal(turned.photodiodes[0][0].to_numpy(), right[::-1, ::-1])
+    np.testing.assert_allclose((2 * image).sum().to_numpy(), 2 * (left + right), rtol=1e-6)
+
+
 def test_a_tile_of_responses_alternates_between_pixels():
     tile = ((AngularFringes(25.0, 0.3, 0.9), patterns.Circle(0.12)),)
     camera = vcc.Camera([LENS], sensor(angular_response=tile))
