@@ -221,6 +221,9 @@ def _of_step(step: steps.Step, whole: list[int], gradients: tables.RayGradients,
         case steps.Cosines():
             turned, of_frequency = own[:2], own[2:4]
             return {"middle": -np.array(step.frequency) * turned, "frequency": of_frequency, "phase": turned.sum()}
+        case steps.Refract(aspheres=aspheres):
+            names = ("distance", "curvature", "conic", "ratio", "radius", "softness", "transmission")
+            return {**dict(zip(names, own, strict=False)), "aspheres": own[8:][: len(aspheres)]}
         case steps.Unscatter(width=steps.Texture() as width):
             return _of_texture("width", width, own, gradients.shares[whole[8] :])
         case _:

@@ -16,6 +16,7 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.interpolation import around, bilinear
+from vcc.engines.ray_surfaces import surface_back, through_surface
 from vcc.engines.ray_tables import Packet, Steps
 
 _inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
@@ -235,6 +236,12 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                             before, now = now, 2 * first_cosine * now - before
                             total += now
                         share[p] *= 0.5 + total / (2 * a[0])
+        elif code == 13:
+            through_surface(a, f, n, x, y, s, t, share)
+        elif code == 14:
+            for p in range(n):
+                per_square = 1.0 / (1.0 + s[p] * s[p] + t[p] * t[p])
+                share[p] *= per_square * per_square
         else:
             for p in range(n):
                 kernel = 0
@@ -269,7 +276,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
         for p in range(n):
             behind[q, p] = before[q, p]
     # The step runs on shares of one: a share that becomes zero there was stopped, not zero before.
-    hole = code == 3 or code == 11 or code == 6 or code == 7
+    hole = code == 3 or code == 11 or code == 6 or code == 7 or code == 13
     if hole:
         for p in range(n):
             behind[4, p] = 1.0
@@ -281,7 +288,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
     take_steps(one, drawn, packet_of(behind))
     if hole:
         for p in range(n):
-            lit[p] *= behind[4, p]
+            lit[p] *= behind[4, p] > 0.0
             behind[4, p] *= before[4, p]
 
 
@@ -436,6 +443,15 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             gx[p] += f[2] * turned_x
             gy[p] += f[3] * turned_y
             gw[p] *= cosines_x * cosines_y
+    elif code == 13:
+        surface_back(a, f, n, before, bar, own)
+    elif code == 14:
+        for p in range(n):
+            per_square = 1.0 / (1.0 + before[2, p] * before[2, p] + before[3, p] * before[3, p])
+            steep = -4.0 * gw[p] * share[p] * per_square * per_square * per_square
+            gs[p] += steep * before[2, p]
+            gt[p] += steep * before[3, p]
+            gw[p] *= per_square * per_square
     elif code == 10:
         for p in range(n):
             kernel = 0

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.plan.rays import steps
+from vcc.plan.rays.refraction_backwards import refraction_back
 from vcc.plan.rays.steps import Bundle, Step, Texture
 from vcc.shapes.lattice import Lattice
 
@@ -209,6 +210,21 @@ def _diffuser(step: steps.Unscatter, before: Bundle, behind: Bundle) -> tuple[Bu
     return replace(moved, x=behind.x + gx, y=behind.y + gy), _under("width", own)
 
 
+def _cosine_fourth(step: steps.CosineFourth, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
+    """Shares are times (1 + s² + t²)⁻²."""
+    per_square = 1 / (1 + before.s**2 + before.t**2)
+    steep = -4 * behind.share * before.share * per_square**3
+    s, t = behind.s + steep * before.s, behind.t + steep * before.t
+    return replace(behind, s=s, t=t, share=behind.share * per_square**2), {}
+
+
+def _refract(step: steps.Refract, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
+    arriving = before.x, before.y, before.s, before.t
+    cotangents = behind.x, behind.y, behind.s, behind.t, behind.share * before.share
+    (x, y, s, t), share, own = refraction_back(step, arriving, cotangents)
+    return replace(behind, x=x, y=y, s=s, t=t, share=behind.share * share), own
+
+
 _BACK: dict[type, Callable[[Any, Bundle, Bundle], tuple[Bundle, Numbers]]] = {
     steps.Move: _move,
     steps.CellsUnbend: _cells,
@@ -222,4 +238,6 @@ _BACK: dict[type, Callable[[Any, Bundle, Bundle], tuple[Bundle, Numbers]]] = {
     steps.Cosines: _cosines,
     steps.TextureShares: _mask,
     steps.Unscatter: _diffuser,
+    steps.Refract: _refract,
+    steps.CosineFourth: _cosine_fourth,
 }

@@ -26,11 +26,12 @@ EDGES: dict[type, tuple[str, ...]] = {
     steps.CellShares: ("corner", "size"),
     steps.FacetsUnbend: ("directions", "decentre"),
     steps.Unscatter: ("cumulative",),
+    steps.Refract: ("radius",),
 }
 """Parameters of steps that move only an edge: there is no derivative to them."""
 BORDERS: dict[type, tuple[str, ...]] = {**EDGES, steps.CellsUnbend: ("lattice", "decentre")}
 """Parameters of steps that move an edge, among other effects."""
-MOVING = (steps.Move, steps.CellsUnbend, steps.FacetsUnbend, steps.TextureUnbend, steps.Unscatter)
+MOVING = (steps.Move, steps.CellsUnbend, steps.FacetsUnbend, steps.TextureUnbend, steps.Unscatter, steps.Refract)
 """Steps that move rays; other steps weight them."""
 PIXELS = 16
 """Pixels a side of the sensor whose rays are tested."""
@@ -165,6 +166,8 @@ def _cut(step: Step, before: Bundle, behind: Bundle, cells: Cell | None) -> str:
     match step:
         case steps.Disc() | steps.Rectangle() | steps.CellGaps() | steps.BlockOfCells():
             return step.words if (behind.share[lit] == 0).any() else ""
+        case steps.Refract(softness=softness):
+            return step.words if softness == 0 and (behind.share[lit] == 0).any() else ""
         case steps.CellShares():
             shares = behind.share[lit] / before.share[lit]
             return f"a border between cells of {step.words}" if shares.size and np.ptp(shares) > 1e-9 else ""

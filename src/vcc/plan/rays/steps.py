@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.lookup import bilinear
+from vcc.optics.refraction import Refraction
 from vcc.shapes.lattice import Lattice
 
 Array = NDArray[np.float64]
@@ -458,3 +459,40 @@ class Unscatter:
             table = packer.shares(np.asarray(texture.values, dtype=np.float32))
             whole, real = [*whole, *texture.whole, table], [*real, *texture.real]
         packer.step(self.code, whole, real)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Refract(Refraction):
+    """A surface of a real lens, met against the light; see `vcc.optics.refraction.Refraction`."""
+
+    words: str = ""
+    code: ClassVar[int] = 13
+
+    def __call__(self, rays: Bundle) -> None:
+        """Refract the rays, and stop those that do not pass."""
+        rays.x, rays.y, rays.s, rays.t, share = self.refracted(rays.x, rays.y, rays.s, rays.t)
+        rays.share = rays.share * share
+
+    def packed(self, packer: Packer) -> None:
+        """All numbers; the aspheric coefficients last."""
+        numbers = (
+            self.distance, self.curvature, self.conic, self.ratio, self.radius, self.softness, self.transmission,
+        )  # fmt: skip
+        whole = [int(self.fresnel), len(self.aspheres)]
+        packer.step(self.code, whole, [*numbers, 0.0, *self.aspheres.tolist()])
+
+
+@dataclass(frozen=True)
+class CosineFourth:
+    """Irradiance by exact angles: cos⁴θ times that by slopes, since dE = L·cosθ dω and ds dt = dω/cos³θ."""
+
+    words: str
+    code: ClassVar[int] = 14
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weight rays by cos⁴θ."""
+        rays.share = rays.share / (1 + rays.s**2 + rays.t**2) ** 2
+
+    def packed(self, packer: Packer) -> None:
+        """No numbers."""
+        packer.step(self.code, [], [])
