@@ -43,7 +43,18 @@ class Glasses:
         object.__setattr__(self, "given", {name.upper(): index for name, index in self.given.items()})
 
     def by_name(self, name: str, catalogues: Sequence[str], place: str, *, in_file: bool = True) -> float:
-        """The index of a catalogue glass.
+        """The index of a catalogue glass, or the index that is given for its name.
+
+        Args: and errors as `catalogued`.
+        """
+        if name.upper() in self.given:
+            return float(self.given[name.upper()])
+        return self.catalogued(name, catalogues, place, in_file=in_file)[1]
+
+    def catalogued(
+        self, name: str, catalogues: Sequence[str], place: str, *, in_file: bool = True
+    ) -> tuple[str, float]:
+        """The name of a catalogue glass with its maker before it (``"SCHOTT N-BK7"``), and its index.
 
         Args:
             name: the maker's name of the glass, such as ``"N-BK7"``.
@@ -55,8 +66,6 @@ class Glasses:
             InputError: the catalogue library is not installed, no catalogue lists the glass, several list
                 different glasses of this name, or the wavelength is outside the data.
         """
-        if name.upper() in self.given:
-            return float(self.given[name.upper()])
         way_out = f'or pass its index: glasses={{"{name}": 1.5168}}, say'
         if not in_file:
             way_out = "or give its numbers: vcc.glasses.Abbe(1.5168, 64.17), say"
@@ -79,23 +88,24 @@ class Glasses:
             way_out = f"name the maker in the file's line GCAT, {way_out}"
         else:
             way_out = f'write the maker before the name, "{_maker(found[0][0])} {name}", {way_out}'
-        return self._chosen(found, name, catalogues, place, way_out)
+        book, index = self._chosen(found, name, catalogues, place, way_out)
+        return f"{_maker(book)} {name}".strip(), index
 
     def _chosen(
         self, found: list[tuple[str, Any]], name: str, catalogues: Sequence[str], place: str, way_out: str
-    ) -> float:
-        """The index from the first catalogue that the file names, else the common index of all catalogues."""
+    ) -> tuple[str, float]:
+        """Catalogue and index: the first catalogue that the file names, else the first if all agree."""
         for catalogue in catalogues:
             for book, material in found:
                 if _maker(book) == _maker(catalogue):
-                    return self._index(material, name, place)
+                    return book, self._index(material, name, place)
         indices = [self._index(material, name, place) for _, material in found]
         if max(indices) - min(indices) > SAME_GLASS:
             listed = ", ".join(f"{_maker(book)} {n:.5f}" for (book, _), n in zip(found, indices, strict=True))
             raise InputError(
                 f'{place}: "{name}" is a different glass in different catalogues ({listed}): {way_out}'
             )
-        return indices[0]
+        return found[0][0], indices[0]
 
     def _index(self, material: Any, name: str, place: str) -> float:
         low, high = material.get_wl_range(unit="m", quantity="n")

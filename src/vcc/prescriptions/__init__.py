@@ -11,9 +11,10 @@ from os import PathLike
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, read_bytes, reading
 from vcc.base.wavelengths import D_LINE
-from vcc.optics.catalogues import Glasses
 from vcc.optics.first_order import FirstOrder
+from vcc.optics.glass import Glass
 from vcc.prescriptions import pbrt, zemax
+from vcc.prescriptions.media import Media
 from vcc.prescriptions.model import Prescription, Reference, Surface
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
@@ -22,18 +23,19 @@ _READERS = {".dat": pbrt.read, ".zmx": zemax.read}
 
 
 def read_prescription(
-    path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float] | None = None
+    path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float | Glass] | None = None
 ) -> Prescription:
     """Read the surfaces of a lens from a file, in the order in which light passes them.
 
     Args:
         path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
         wavelength: wavelength for catalogue glasses, metres; a ``.dat`` states indices at one wavelength only.
-        glasses: refractive indices by name, which override catalogues: ``{"N-BK7": 1.5168}``.
+        glasses: refractive indices, or glasses of `vcc.glasses`, by name, which override catalogues:
+            ``{"N-BK7": 1.5168}``.
 
     Raises:
-        InputError: no such file, another file format, an invalid line, a surface without a paraxial reduction
-            here (asphere, mirror, coordinate break …), or an unknown glass. The message names the file and the
+        InputError: no such file, another file format, an invalid line, a surface that is not supported (mirror,
+            coordinate break, grating …), or an unknown glass. The message names the file and the
             surface or line.
     """
     file = expanded(path)
@@ -43,9 +45,9 @@ def read_prescription(
             f"{file} is not a lens prescription that can be read: known are .dat (PBRT) and .zmx (Zemax)"
         )
     content = read_bytes(file, "lens prescription")
-    named = Glasses(wavelength, dict(glasses or {}))
+    media = Media(wavelength, dict(glasses or {}))
     with reading(file, "a lens prescription"):
-        return reader(content, file, named)
+        return reader(content, file, media)
 
 
 def load_lens(

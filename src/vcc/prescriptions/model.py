@@ -17,6 +17,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
+from vcc.optics.glass import Glass
 
 Matrix = NDArray[np.float64]
 
@@ -28,16 +29,21 @@ AIR_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Surface:
-    """A spherical or flat surface, or the aperture stop.
+    """A surface of rotation, or the aperture stop.
+
+    Its sag is z = c·r²/(1 + √(1 − (1 + k)·c²·r²)) + a₀·r⁴ + a₁·r⁶ + …, with c = 1/radius (ISO 10110-12).
 
     Args:
         radius: radius of curvature, metres, positive if the centre is behind the surface; infinite for a plane.
         thickness: distance to the next surface along the axis, metres.
-        index: refractive index of the medium behind the surface, relative to air.
+        index: refractive index of the medium behind the surface, relative to air, at one wavelength.
         diameter: clear diameter, metres; None if the file states none.
         stop: whether this is the aperture stop.
         glass: the file's name of the medium behind; empty for air and for glasses given by index.
         number: number of the surface in its file, for messages.
+        conic: k: 0 a sphere, −1 a paraboloid, below −1 a hyperboloid.
+        aspheres: (a₀, a₁, …), of r⁴, r⁶ …, m⁻³, m⁻⁵ …; trailing zeros are removed.
+        material: the medium behind by wavelength; None for air and if only one index is known.
     """
 
     radius: float = field(metadata={"unit": "length"})
@@ -47,6 +53,15 @@ class Surface:
     stop: bool = False
     glass: str = ""
     number: int = 0
+    conic: float = 0.0
+    aspheres: tuple[float, ...] = ()
+    material: Glass | None = None
+
+    def __post_init__(self) -> None:
+        terms = [float(term) for term in self.aspheres]
+        while terms and terms[-1] == 0:
+            terms.pop()
+        object.__setattr__(self, "aspheres", tuple(terms))
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,6 +101,8 @@ class Prescription(Brief):
                 raise InputError(
                     f"{where} has refractive index {surface.index:g} behind it: 1 is air, no glass is below"
                 )
+            if not all(map(math.isfinite, (surface.conic, *surface.aspheres))):
+                raise InputError(f"{where} has a conic constant or an aspheric term that is not a finite number")
         for surface in self.surfaces[:-1]:
             if not (surface.thickness >= 0 and math.isfinite(surface.thickness)):
                 raise InputError(
@@ -106,6 +123,39 @@ class Prescription(Brief):
                 f"{last.index:g}, not into air. If the image lies against a cover glass, leave the glass out or "
                 "list its back surface"
             )
+
+    @property
+    def disperses(self) -> bool:
+        """Whether an index is known by wavelength, so that `at_wavelength` changes the lens."""
+        return any(surface.material is not None for surface in self.surfaces)
+
+    def at_wavelength(self, wavelength: float) -> Prescription:
+        """The lens with its indices at another wavelength; indices without a material stay.
+
+        Args:
+            wavelength: in vacuum, metres.
+
+        Raises:
+            InputError: a wavelength for which a glass is not known. The message names the surface.
+        """
+        surfaces = []
+        for surface in self.surfaces:
+            if surface.material is not None:
+                try:
+                    index = surface.material.index(wavelength)
+                except InputError as error:
+                    raise InputError(
+                        f"{self.source or 'this prescription'}: surface {surface.number}: {error}"
+                    ) from None
+                surface = dataclasses.replace(surface, index=index)
+            surfaces.append(surface)
+        return dataclasses.replace(self, surfaces=tuple(surfaces))
+
+    @property
+    def back_focal_distance(self) -> float:
+        """Distance from the last surface to the paraxial image of a distant scene, metres; infinite if afocal."""
+        (a, _), (c, _) = self.matrix
+        return -float(a / c) if c != 0 else math.inf
 
     @property
     def length(self) -> float:

@@ -12,14 +12,14 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
-from vcc.optics.catalogues import Glasses
+from vcc.prescriptions.media import Media
 from vcc.prescriptions.model import Prescription, Surface
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")
 
 
-def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
-    """Read the prescription in a PBRT lens table; its indices are for one wavelength, so ``glasses`` is not used.
+def read(content: bytes, file: Path, media: Media) -> Prescription:
+    """Read the prescription in a PBRT lens table; its indices are for one wavelength, so ``media`` is not used.
 
     Raises:
         InputError: no surfaces, or a line that is not four numbers. The message names file and line.

@@ -1,4 +1,4 @@
-"""Sequential lenses from Zemax OpticStudio's text files (.zmx): spheres and planes in glass and air.
+"""Sequential lenses from Zemax OpticStudio's text files (.zmx): spheres, conics and even aspheres.
 
 Each line is a keyword and values. ``SURF n`` starts a surface, with CURV the curvature, DISZ the distance to
 the next surface, GLAS the medium behind, DIAM the semi-diameter, and STOP marking the aperture stop. The first
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import cm, m, mm
-from vcc.optics.catalogues import Glasses
+from vcc.prescriptions.media import AIR, Media, Medium
 from vcc.prescriptions.model import Prescription, Surface
 
 _UNITS = {
@@ -32,9 +32,8 @@ _MODEL_GLASS = "___BLANK"
 _SYSTEM = {"UNIT", "MODE", "NAME", "GCAT", "FNUM", "ENPD"}
 _PER_SURFACE = {"STOP", "TYPE", "CURV", "DISZ", "GLAS", "DIAM", "CONI"}
 _TYPES = {
-    "EVENASPH": "an asphere",
-    "ODDASPHE": "an asphere",
-    "XASPHERE": "an asphere",
+    "ODDASPHE": "an odd asphere",
+    "XASPHERE": "an extended asphere",
     "COORDBRK": "a coordinate break",
     "TOROIDAL": "a toroid",
     "BICONICX": "a biconic surface",
@@ -53,12 +52,13 @@ class _Lines:
 
     number: int = -1
     found: dict[str, tuple[int, list[str]]] = field(default_factory=dict)
+    parameters: dict[int, float] = field(default_factory=dict)
 
     def values(self, keyword: str) -> list[str]:
         return self.found.get(keyword, (0, []))[1]
 
 
-def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
+def read(content: bytes, file: Path, media: Media) -> Prescription:
     """Read the prescription in a Zemax file.
 
     Raises:
@@ -77,7 +77,7 @@ def read(content: bytes, file: Path, glasses: Glasses) -> Prescription:
     for surface in surfaces:  # before glasses are looked up: a lens with mirrors raises without a catalogue
         _check_supported(surface, file)
     makers = head.values("GCAT")
-    listed = [_surface(surface, unit, makers, glasses, file, _place(file, surface)) for surface in surfaces[:-1]]
+    listed = [_surface(surface, unit, makers, media, file, _place(file, surface)) for surface in surfaces[:-1]]
     if listed[0].index != 1.0:
         raise InputError(f"{file}: the object lies in {listed[0].glass or 'glass'}, not in air")
     inner, image_distance = _without_idle_ends(listed[1:])
@@ -113,6 +113,8 @@ def _grouped(text: str, file: Path) -> tuple[_Lines, list[_Lines]]:
                     f"{file}, line {number}: surface {expected} should follow, not {' '.join(values)!r}"
                 )
             surfaces.append(_Lines(expected))
+        elif surfaces and keyword == "PARM":
+            _parameter(surfaces[-1], number, values, file)
         elif surfaces and keyword in _PER_SURFACE:
             surfaces[-1].found.setdefault(keyword, (number, values))
         elif keyword in _SYSTEM:
@@ -120,6 +122,15 @@ def _grouped(text: str, file: Path) -> tuple[_Lines, list[_Lines]]:
     if not surfaces:
         raise InputError(f"{file} lists no surfaces: a Zemax lens has lines SURF 0, SURF 1 …")
     return head, surfaces
+
+
+def _parameter(surface: _Lines, line: int, values: list[str], file: Path) -> None:
+    try:
+        surface.parameters[int(values[0])] = float(values[1])
+    except (IndexError, ValueError):
+        raise InputError(
+            f'{_place(file, surface)}, line {line}: "PARM {" ".join(values)}" should have two numbers'
+        ) from None
 
 
 def _keywords(text: str) -> Iterator[tuple[int, str, list[str]]]:
@@ -173,18 +184,16 @@ def _entrance_pupil(head: _Lines, unit: float, file: Path) -> float | None:
 def _check_supported(surface: _Lines, file: Path) -> None:
     place = _place(file, surface)
     kind = (surface.values("TYPE") or ["STANDARD"])[0].upper()
-    if kind != "STANDARD":
-        what = _TYPES.get(kind, "a gradient-index surface" if kind.startswith("GRAD") else "not a sphere or plane")
-        raise InputError(f"{place} is {what} (TYPE {kind}), which is not supported: only spheres and planes are")
+    if kind not in ("STANDARD", "EVENASPH"):
+        what = _TYPES.get(kind, "a gradient-index surface" if kind.startswith("GRAD") else "not a known surface")
+        raise InputError(
+            f"{place} is {what} (TYPE {kind}), which is not supported: only spheres, conics and even aspheres are"
+        )
     if surface.values("GLAS")[:1] == ["MIRROR"]:
         raise InputError(f"{place} is a mirror (GLAS MIRROR), which is not supported: only refracting lenses are")
-    if "CONI" in surface.found and (conic := _number(surface, "CONI", 0, place, file)) != 0:
-        raise InputError(
-            f"{place} is an asphere (CONI {conic:g}), which is not supported: only spheres and planes are"
-        )
 
 
-def _surface(surface: _Lines, unit: float, makers: list[str], glasses: Glasses, file: Path, place: str) -> Surface:
+def _surface(surface: _Lines, unit: float, makers: list[str], media: Media, file: Path, place: str) -> Surface:
     for keyword in ("CURV", "DISZ"):
         if keyword not in surface.found:
             raise InputError(f"{place} has no line {keyword}")
@@ -192,32 +201,44 @@ def _surface(surface: _Lines, unit: float, makers: list[str], glasses: Glasses, 
     distance = surface.values("DISZ")[:1]
     thickness = math.inf if distance == ["INFINITY"] else _number(surface, "DISZ", 0, place, file) * unit
     diameter = 2 * _number(surface, "DIAM", 0, place, file) * unit if "DIAM" in surface.found else 0.0
-    name, index = _medium(surface, makers, glasses, place, file)
+    medium = _medium(surface, makers, media, place, file)
     return Surface(
         radius=math.inf if curvature == 0 else unit / curvature,
         thickness=thickness,
-        index=index,
+        index=medium.index,
         diameter=diameter if diameter > 0 else None,
         stop="STOP" in surface.found,
-        glass=name,
+        glass=medium.glass,
         number=surface.number,
+        conic=_number(surface, "CONI", 0, place, file) if "CONI" in surface.found else 0.0,
+        aspheres=_aspheres(surface, unit, place, file),
+        material=medium.material,
     )
 
 
-def _medium(surface: _Lines, makers: list[str], glasses: Glasses, place: str, file: Path) -> tuple[str, float]:
-    """Name and index of the medium behind a surface; ("", 1.0) is air.
+def _aspheres(surface: _Lines, unit: float, place: str, file: Path) -> tuple[float, ...]:
+    """The terms of r⁴, r⁶ … of an EVENASPH surface, whose parameter i is the term of r^2i."""
+    if surface.values("TYPE")[:1] != ["EVENASPH"]:
+        return ()
+    if surface.parameters.get(1, 0.0) != 0:
+        raise InputError(
+            f"{place} has a term of r² (PARM 1 {surface.parameters[1]:g}), which is not supported: "
+            "add it to the curvature"
+        )
+    return tuple(surface.parameters.get(i, 0.0) * unit ** (1 - 2 * i) for i in range(2, 9))
 
-    The index after a catalogue name is ignored: files have placeholders there.
-    """
+
+def _medium(surface: _Lines, makers: list[str], media: Media, place: str, file: Path) -> Medium:
+    """The medium behind a surface; the index after a catalogue name is ignored: files have placeholders there."""
     if "GLAS" not in surface.found:
-        return "", 1.0
+        return AIR
     values = surface.values("GLAS")
     if not values:
         raise InputError(f"{place} has a line GLAS that names no glass")
     if values[0] != _MODEL_GLASS:
-        return values[0], glasses.by_name(values[0], makers, place)
+        return media.of_name(values[0], makers, place)
     abbe_number = _number(surface, "GLAS", 4, place, file) if len(values) > 4 else 0.0
-    return "", glasses.by_index(_number(surface, "GLAS", 3, place, file), abbe_number)
+    return media.of_numbers(_number(surface, "GLAS", 3, place, file), abbe_number, place)
 
 
 def _without_idle_ends(surfaces: list[Surface]) -> tuple[list[Surface], float | None]:
