@@ -23,7 +23,7 @@ from vcc.files.pictures import auto_exposure
 from vcc.files.transfer import encode
 from vcc.plot import plot_element, style
 from vcc.plot.tracing import trace
-from vcc.prescriptions.model import Prescription, Surface
+from vcc.optics.prescription import Prescription, Surface
 from vcc.showcase.scene import FAR, MIDDLE, NEAR, Chart, Foliage, demo_scene
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Painting

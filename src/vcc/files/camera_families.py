@@ -25,7 +25,7 @@ from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder, glass
 from vcc.optics.glass import Glass
 from vcc.prescriptions import load_lens
-from vcc.prescriptions.model import Reference
+from vcc.optics.prescription import Reference
 from vcc.shapes import by_channel, directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern

@@ -15,7 +15,7 @@ from vcc.optics.first_order import FirstOrder
 from vcc.optics.glass import Glass
 from vcc.prescriptions import pbrt, zemax
 from vcc.prescriptions.media import Media
-from vcc.prescriptions.model import Prescription, Reference, Surface
+from vcc.optics.prescription import Prescription, Reference, Surface
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.prescriptions.media import Media
-from vcc.prescriptions.model import Prescription, Surface
+from vcc.optics.prescription import Prescription, Surface
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from vcc.base.errors import InputError
 from vcc.base.units import cm, m, mm
 from vcc.prescriptions.media import AIR, Media, Medium
-from vcc.prescriptions.model import Prescription, Surface
+from vcc.optics.prescription import Prescription, Surface
 
 _UNITS = {
     "MM": mm,
