@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from vcc.optics import Element as Element
     from vcc.optics import Faces as Faces
     from vcc.optics import FirstOrder as FirstOrder
+    from vcc.optics import RealLens as RealLens
     from vcc.optics import Lens as Lens
     from vcc.optics import LensArray as LensArray
     from vcc.optics import Louvre as Louvre
@@ -65,6 +66,7 @@ _HOMES = {
     "Element": "vcc.optics",
     "Faces": "vcc.optics",
     "FirstOrder": "vcc.optics",
+    "RealLens": "vcc.optics",
     "How": "vcc.plan.how",
     "Image": "vcc.image",
     "InputError": "vcc.base.errors",

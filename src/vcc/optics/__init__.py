@@ -12,6 +12,7 @@ from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
 from vcc.optics.pixels import Microlens
 from vcc.optics.prisms import Biprism, Prism, Pyramid
+from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.terms import Term
 from vcc.shapes.lattice import Lattice
@@ -40,6 +41,7 @@ __all__ = [
     "PrismArray",
     "Pupil",
     "Pyramid",
+    "RealLens",
     "Scatter",
     "SheetMap",
     "SlopeFunction",

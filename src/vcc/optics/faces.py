@@ -21,6 +21,7 @@ from vcc.base.affine import Affine
 from vcc.base.describe import kind_in_words, parameters_in_words
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
+from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
@@ -53,7 +54,7 @@ class Faces:
             or a face of another type.
     """
 
-    deflection: Affine | Deflection | Callable[[Array, Array], Any] | None = None
+    deflection: Affine | Deflection | Aberrations | Callable[[Array, Array], Any] | None = None
     transmission: Pattern | Callable[[Array, Array], ArrayLike] | None = None
     scatter: Scatter | Kernel | None = None
     terms: tuple[Term, ...] = ()
@@ -66,7 +67,7 @@ class Faces:
         object.__setattr__(self, "terms", terms)
         if isinstance(self.deflection, Affine):
             _check_thin(self.deflection)
-        elif self.deflection is not None:
+        elif self.deflection is not None and not isinstance(self.deflection, Aberrations):
             deflection = as_deflection(self.deflection)
             object.__setattr__(self, "deflection", _simplest(deflection))
         if self.transmission is not None:
@@ -87,9 +88,9 @@ class Faces:
         return self.deflection if isinstance(self.deflection, Affine) else None
 
     @property
-    def bending(self) -> Deflection | None:
+    def bending(self) -> Deflection | Aberrations | None:
         """The deflection if it is not affine."""
-        return self.deflection if isinstance(self.deflection, Deflection) else None
+        return self.deflection if isinstance(self.deflection, Deflection | Aberrations) else None
 
     @property
     def spread(self) -> Scatter | None:

@@ -22,6 +22,8 @@ from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.base.units import short
 from vcc.base.values import Value
+from vcc.optics.aberrations import Aberrations
+from vcc.optics.deflections import Deflection
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
 from vcc.optics.sensor import Sensor
@@ -81,14 +83,20 @@ class Stage(Brief):
     def bent(self, x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[Any, Any]:
         """(Δs, Δt) of the deflection that is not affine, at camera places x, y; errors name the element."""
         bending = self.faces.bending
-        assert bending is not None
+        assert isinstance(bending, Deflection)
         with self.named():
             return bending(x - self.element.decentre[0], y - self.element.decentre[1])
 
     def deflected(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Rays (..., 4) of the camera just behind the deflection, affine or not; errors name the element."""
+        """Rays (..., 4) of the camera just behind the deflection, affine or not; errors name the element.
+
+        Rays that the surfaces of a real lens stop become NaN.
+        """
         if self.centred is not None:
             return np.asarray(self.centred(rays))
+        if isinstance(self.faces.bending, Aberrations):
+            middle = [*self.element.decentre, 0.0, 0.0]
+            return self.faces.bending.deflected(rays - middle) + middle
         if self.faces.bending is None:
             return rays
         slopes = self.bent(rays[..., 0], rays[..., 1])

@@ -16,7 +16,9 @@ from vcc.base.describe import Brief
 from vcc.base.units import short
 from vcc.base.values import content
 from vcc.fields.grid import ALL, Block, Grid
-from vcc.optics.deflections import CellDeflection, FacetDeflection
+from vcc.optics.aberrations import Aberrations
+from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection
+from vcc.optics.faces import Element
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
 from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, gathered, give
@@ -376,7 +378,11 @@ def steps_met(
                 check_unchanged("whether rays are aimed at it", own.aimed_at, at)
             if faces.pattern is not None and not at:
                 here += _transmission(faces.pattern, met)
-            if faces.bending is not None:
+            if isinstance(faces.bending, Aberrations):
+                made += _surfaces(faces.bending, stage.element, pending)
+                middle = stage.element.decentre
+                pending = Affine.translation(*middle, 0, 0) @ Affine.propagation(faces.bending.beginning)
+            elif faces.bending is not None:
                 here.append(_deflection(met))
             if faces.spread is not None:
                 here.append(_scatter(faces.spread, leg.column, met))
@@ -458,9 +464,20 @@ def _transmission(pattern: Pattern, met: _Met) -> list[steps.Step]:
     return [steps.TextureShares(replace(texture, values=values), label)]
 
 
+def _surfaces(lens: Aberrations, element: Element, pending: Affine) -> list[steps.Step]:
+    """The surfaces of a real lens, met from behind by rays in its first plane with the first order undone."""
+    x, y = element.decentre
+    to_last = lens.first_order @ Affine.translation(-x, -y, 0, 0) @ pending
+    made: list[steps.Step] = [steps.Move(to_last)]
+    if lens.cosine_fourth:
+        made.append(steps.CosineFourth(f"the fall-off of light behind {element.label}"))
+    words = f"the surfaces of {element.label}"
+    return made + [steps.Refract(**vars(surface), words=words) for surface in lens.back]
+
+
 def _deflection(met: _Met) -> steps.Step:
     bending, decentre, label = met.stage.faces.bending, met.stage.element.decentre, met.label
-    assert bending is not None
+    assert isinstance(bending, Deflection)
     if isinstance(bending, CellDeflection):
         return steps.CellsUnbend(bending.lattice, decentre, bending.powers, bending.slopes, label)
     if isinstance(bending, FacetDeflection):

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
+from vcc.optics.aberrations import Aberrations
+from vcc.optics.deflections import Deflection
 from vcc.plan.rays.bounds.extent import RayExtent, extent_towards
 from vcc.plan.rays.bounds.windows import Aim
 from vcc.plan.rays.path import Leg, Path
@@ -73,7 +75,7 @@ def regions_and_deflections(
         deflections.unknown.append(unknown.loose)
         regions.append(_met(extent, leg))
         kept = None if bends is None else bends[leg.number]
-        most = largest_bend(leg, regions[-1]) if kept is None else kept
+        most = _deviation(leg, extent, regions[-1]) if kept is None else kept
         if most is not None:
             extent, unknown = extent.loosened(most), unknown.loosened(most)
         extent, unknown = _scattered(extent, unknown, leg)
@@ -89,13 +91,23 @@ def _met(extent: RayExtent, leg: Leg) -> tuple[Array, Array]:
     return low, np.maximum(high, low)
 
 
-def largest_bend(leg: Leg, region: tuple[Array, Array]) -> Slopes:
-    """The largest deflection (|δs|, |δt|) by a leg's stage in a region; None if it does not deflect rays.
+def _deviation(leg: Leg, extent: RayExtent, region: tuple[Array, Array]) -> tuple[float, ...] | None:
+    """The largest change of slopes by a leg's stage, or of places and slopes by a real lens; None for none."""
+    bending = leg.stage.faces.bending
+    if isinstance(bending, Aberrations):
+        middle = extent.middle - [*leg.stage.element.decentre, 0.0, 0.0]
+        return bending.largest(middle, extent.basis, extent.loose)
+    return largest_bend(leg, region)
 
+
+def largest_bend(leg: Leg, region: tuple[Array, Array]) -> Slopes:
+    """The largest deflection (|δs|, |δt|) by a leg's stage in a region.
+
+    None if it does not deflect rays, and for a real lens, whose deviation depends on slopes too.
     The aim cannot compensate deflections that vary over the surface.
     """
     bending, middle = leg.stage.faces.bending, leg.stage.element.decentre
-    if bending is None:
+    if not isinstance(bending, Deflection):
         return None
     reach = np.maximum(*(np.abs(corner - middle) for corner in region))
     with leg.stage.named():

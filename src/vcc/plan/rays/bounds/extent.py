@@ -59,10 +59,9 @@ class RayExtent(Brief):
         linear, offset = before_from_behind.linear, before_from_behind.offset
         return RayExtent(linear @ self.middle + offset, linear @ self.basis, linear @ self.loose)
 
-    def loosened(self, slopes: tuple[float, float]) -> RayExtent:
-        """The rays after an element that changes slopes by up to (|δs|, |δt|)."""
-        added = np.zeros((4, 2))
-        added[2, 0], added[3, 1] = slopes
+    def loosened(self, changes: tuple[float, ...]) -> RayExtent:
+        """The rays after an element that changes slopes by up to (|δs|, |δt|), or all of (x, y, s, t)."""
+        added = np.diag(changes) if len(changes) == 4 else np.vstack([np.zeros((2, 2)), np.diag(changes)])
         return RayExtent(self.middle, self.basis, np.concatenate([self.loose, added], axis=1))
 
     @property

@@ -1,0 +1,97 @@
+"""What the surfaces of a real lens do to rays beyond the lens's first-order map.
+
+With R the exact map of rays from plane a to plane b through the surfaces, and M the first-order one, the lens is
+E = M⁻¹R in plane a, followed by M. E is the identity for a lens without aberrations. So a train sees a stage that
+bends rays, and then an affine map; plans trace the surfaces themselves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from vcc.base.affine import Affine
+from vcc.base.cached import cached
+from vcc.base.values import Value
+from vcc.optics.refraction import Refraction, traced
+
+Array = NDArray[np.float64]
+
+RAYS = 12
+"""Binary logarithm of the number of rays that bound the deviation from first order."""
+MARGIN = 1.25
+"""Factor on the largest deviation that these rays have."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Aberrations(Value):
+    """The surfaces between two planes across the axis, in coordinates centred on the lens.
+
+    Args:
+        onward: the surfaces as light meets them, from plane a on.
+        ending: from the last surface's vertex to plane b, metres.
+        back: the surfaces as rays traced back from plane b meet them.
+        beginning: from the first surface's vertex to plane a, metres, mostly negative or 0.
+        first_order: M, 5×5, from plane a to plane b.
+        cosine_fourth: whether light behind plane b counts by exact angles rather than by slopes.
+    """
+
+    onward: tuple[Refraction, ...]
+    ending: float
+    back: tuple[Refraction, ...]
+    beginning: float
+    first_order: Affine
+    cosine_fourth: bool = False
+
+    def through(self, rays: Array) -> tuple[Array, Array]:
+        """Rays (..., 4) of plane a in plane b, and the share of light of each that passes, (...)."""
+        found, share = traced(self.onward, rays)
+        return _flown(found, self.ending), share
+
+    def back_through(self, rays: Array) -> tuple[Array, Array]:
+        """Rays (..., 4) of plane b in plane a, and the share of light of each that passes, (...)."""
+        found, share = traced(self.back, rays)
+        return _flown(found, self.beginning), share
+
+    def deflected(self, rays: Array) -> Array:
+        """E of rays (..., 4) in plane a; rays that do not pass become NaN."""
+        found, share = self.through(rays)
+        return np.where(share[..., None] > 0, self._from_b(found), np.nan)
+
+    def shares(self, rays: Array) -> Array:
+        """The share of light that passes of rays (..., 4) in plane a, without the factor cos⁴θ."""
+        return self.through(rays)[1]
+
+    def largest(self, middle: Array, basis: Array, loose: Array) -> tuple[float, float, float, float]:
+        """Bounds of |E⁻¹ − 1| in (x, y, s, t) over rays behind E that pass, by tracing many of them.
+
+        Args:
+            middle: (4,); the rays are middle + basis · ξ + loose · η, with all |ξ|, |η| ≤ 1.
+            basis: (4, 4).
+            loose: (4, any number).
+        """
+        columns = np.concatenate([basis, loose], axis=1)
+        drawn = qmc.Sobol(columns.shape[1], seed=0).random_base2(RAYS) * 2 - 1
+        inner = 1 << (RAYS - 1)
+        drawn[inner:] /= np.abs(drawn[inner:]).max(axis=1, keepdims=True)  # half of them on the border
+        rays = middle + drawn @ columns.T
+        found, share = self.back_through(self.first_order(rays))
+        away = np.abs(found - rays)[share > 0]
+        x, y, s, t = (MARGIN * away.max(axis=0)).tolist() if len(away) else (0.0,) * 4
+        return x, y, s, t
+
+    def _from_b(self, rays: Array) -> Array:
+        return np.asarray(self._inverse(rays))
+
+    @property
+    @cached
+    def _inverse(self) -> Affine:
+        return self.first_order.inverse()
+
+
+def _flown(rays: Array, distance: float) -> Array:
+    """Rays in a plane further along the axis."""
+    return np.concatenate([rays[..., :2] + distance * rays[..., 2:], rays[..., 2:]], axis=-1)

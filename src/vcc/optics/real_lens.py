@@ -1,0 +1,359 @@
+"""A real lens: rays refracted exactly by each surface of a prescription."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base import checks
+from vcc.base.affine import Affine
+from vcc.base.cached import cached
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.optics.aberrations import Aberrations
+from vcc.optics.band import Band
+from vcc.optics.faces import Element, Faces, Part, Way
+from vcc.optics.first_order import FirstOrder
+from vcc.optics.prescription import Prescription, Surface
+from vcc.optics.refraction import Refraction, traced
+from vcc.shapes.patterns import Circle, Pattern
+
+Array = NDArray[np.float64]
+
+Radiometry = Literal["exact", "paraxial"]
+"""How the irradiance behind a lens counts: by angles (cos⁴θ), or by slopes."""
+PUPIL_MARGIN = 1.005
+"""Factor on the radius of the exit pupil that traced rays fill."""
+FARTHEST = 100.0
+"""An exit pupil farther away than this many lengths of the lens is replaced by the plane behind the lens."""
+
+
+@dataclass(frozen=True)
+class RealLens(Element):
+    """A lens with all its aberrations, vignetting and colour: each ray is refracted by each surface.
+
+    Refraction follows Snell's law without approximation, so the lens is exact within geometric optics; light
+    reflected between surfaces (flare) and diffraction are not simulated. Rays pass if they are within the clear
+    diameter of every surface that has one. A light field on either side is described by slopes, as everywhere.
+
+    Args:
+        prescription: the surfaces; `vcc.load_lens` reads them from a file.
+        stop_diameter: of the round aperture stop, metres; None: that of the prescription.
+        mask: transmission in the plane of the stop, in place of the round opening; the stop must be a flat surface
+            in air.
+        front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
+        dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
+        radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as behind
+            thin lenses, without the fall-off cos⁴θ.
+        transmission: share of light that each surface transmits; ``"fresnel"``: that of surfaces without
+            coatings, from indices and angles; a number for all, or one for each surface.
+        softness: width over which the edges of stop and rims fall off, metres; 0 is hard. Gradients with respect to
+            what moves an edge against rays need soft edges.
+        source: where the lens comes from, as text.
+
+    Raises:
+        InputError: nothing bounds the light (no stop and no diameters), a mask but no flat stop in air, a
+            transmission that is not a share, or another value out of range.
+    """
+
+    prescription: Prescription
+    stop_diameter: float | None = field(default=None, metadata={"unit": "length"})
+    mask: Pattern | None = None
+    front: float = field(default=0.0, metadata={"unit": "length"})
+    dispersion: bool = True
+    radiometry: Radiometry = "exact"
+    transmission: float | tuple[float, ...] | Literal["fresnel"] = 1.0
+    softness: float = field(default=0.0, metadata={"unit": "length"})
+    source: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.prescription, Prescription):
+            raise InputError(
+                f"{self.label} needs a prescription, not {type(self.prescription).__name__}: vcc.load_lens(file, "
+                'model="real") reads one'
+            )
+        checks.sizes(self.label, stop_diameter=self.stop_diameter, way_out="leave it out for that of the file")
+        checks.finite(f"front of {self.label}", self.front, "metres")
+        checks.one_of(f"radiometry of {self.label}", self.radiometry, get_args(Radiometry))
+        checks.zero_or_more(f"softness of {self.label}", self.softness, unit="m")
+        self._check_transmission()
+        if self.mask is not None and self._split is None:
+            raise InputError(
+                f"{self.label} has no plane for a mask: the stop of {self.prescription.source or 'its prescription'} "
+                "must be a flat surface in air"
+            )
+        if self._stop_number is None:
+            raise InputError(
+                f"nothing bounds the light through {self.label}: its prescription marks no stop and states no "
+                "diameters. Give the surfaces diameters"
+            )
+
+    def _check_transmission(self) -> None:
+        given = self.transmission
+        if isinstance(given, str):
+            checks.one_of(f"transmission of {self.label}", given, ("fresnel",))
+            return
+        count = len(self.prescription.surfaces)
+        shares = given if isinstance(given, Sequence) else (given,) * count
+        if len(shares) != count:
+            raise InputError(
+                f"transmission of {self.label} has {len(shares)} shares, and the lens has {count} surfaces: give one "
+                'for each, one number for all, or "fresnel"'
+            )
+        for share in shares:
+            if not (isinstance(share, int | float) and 0 < share <= 1):
+                raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share!r}")
+
+    # --- the lens in first order
+
+    @property
+    @cached
+    def first_order(self) -> FirstOrder:
+        """The lens without aberrations: focal length, principal planes, pupils, image distance."""
+        lens = self.prescription.first_order(z=self.z, stop_diameter=self.stop_diameter, decentre=self.decentre)
+        to_first, behind = Affine.propagation(self.front), Affine.propagation(self._behind)
+        matrix = (behind @ lens.affine @ to_first).linear[0:4:2, 0:4:2]
+        stop = lens.stop_from_entrance
+        if stop is not None:
+            stop = np.array(stop) @ to_first.linear[0:4:2, 0:4:2]
+        return replace(lens, matrix=matrix, length=self.length, stop_from_entrance=stop, name=self.name)
+
+    @property
+    def length(self) -> float:
+        """From z to the vertex of the last surface, or 0 if that stands before z, metres."""
+        return max(self.front + self.prescription.length, 0.0)
+
+    @property
+    def _behind(self) -> float:
+        """From the vertex of the last surface to the end of the element, metres."""
+        return self.length - (self.front + self.prescription.length)
+
+    @property
+    def focal_length(self) -> float:
+        """By the first order, metres."""
+        return self.first_order.focal_length
+
+    @property
+    def f_number(self) -> float:
+        """By the first order, for a distant scene."""
+        return self.first_order.f_number
+
+    def image_distance(self, object_distance: float) -> float:
+        """From the end of the element to the first-order image; see `vcc.FirstOrder.image_distance`."""
+        return self.first_order.image_distance(object_distance)
+
+    @property
+    def focus_z(self) -> float:
+        """Place on the axis of the first-order image of a distant scene, metres."""
+        return self.z + self.length + self.image_distance(math.inf)
+
+    # --- surfaces
+
+    @property
+    def _stop_number(self) -> int | None:
+        """The position of the surface that limits the light: the marked stop, or the smallest diameter."""
+        surfaces = self.prescription.surfaces
+        for n, surface in enumerate(surfaces):
+            if surface.stop:
+                return n
+        known = [(surface.diameter, n) for n, surface in enumerate(surfaces) if surface.diameter is not None]
+        return min(known)[1] if known else None
+
+    @property
+    def _split(self) -> int | None:
+        """The position of the stop if a mask can stand in its plane: flat, in air on both sides."""
+        number, surfaces = self._stop_number, self.prescription.surfaces
+        if number is None or not surfaces[number].stop:
+            return None
+        stop = surfaces[number]
+        before = surfaces[number - 1].index if number else 1.0
+        flat = math.isinf(stop.radius) and not stop.aspheres
+        return number if flat and before == 1.0 == stop.index and 0 < number < len(surfaces) - 1 else None
+
+    def _opening(self) -> float | None:
+        """The diameter of the stop, if one is marked."""
+        if self.prescription.stop is None:
+            return None
+        return self.prescription.first_order(stop_diameter=self.stop_diameter).stop_diameter
+
+    @property
+    @cached
+    def _onward(self) -> tuple[Refraction, ...]:
+        """All surfaces as light meets them from the plane z on."""
+        surfaces, opening = self.prescription.surfaces, self._opening()
+        found: list[Refraction] = []
+        before = 1.0
+        for n, surface in enumerate(surfaces):
+            diameter = opening if surface.stop else surface.diameter
+            if surface.stop and self.mask is not None:
+                diameter = None
+            given = self.transmission
+            share = 1.0 if isinstance(given, str) else given[n] if isinstance(given, Sequence) else given
+            found.append(
+                Refraction(
+                    distance=self.front if n == 0 else surfaces[n - 1].thickness,
+                    curvature=1 / surface.radius,
+                    conic=float(surface.conic),
+                    aspheres=np.array(surface.aspheres, dtype=np.float64),
+                    ratio=before / surface.index,
+                    radius=math.inf if diameter is None else diameter / 2,
+                    softness=self.softness if diameter is not None else 0.0,
+                    transmission=1.0 if _is_empty(surface, before) else float(share),
+                    fresnel=given == "fresnel" and not _is_empty(surface, before),
+                )
+            )
+            before = surface.index
+        return tuple(found)
+
+    def parts(self) -> tuple[Part, ...]:
+        """The surfaces' deviation from first order, the first order, and the exit pupil that light fills.
+
+        The exit pupil's disc stops no ray that the surfaces let pass: it is there for rays to be aimed at.
+        """
+        onward, split = self._onward, self._split if self.mask is not None else None
+        distance, radius = self.exit_window
+        last = Affine.propagation(distance)
+        window = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
+        weighted = self.radiometry == "exact"
+        if split is None:
+            whole = _between(onward, self._behind, weighted)
+            return (Faces(deflection=whole), whole.first_order, *window)
+        front = _between(onward[:split], onward[split].distance, False)
+        rear = _between(onward[split + 1 :], self._behind, weighted)
+        middle = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
+        return (*middle, Faces(deflection=rear), rear.first_order, *window)
+
+    def faces(self) -> Faces:
+        """No faces: the effect of a thick element is between its planes; see `parts`."""
+        return Faces()
+
+    @property
+    @cached
+    def exit_window(self) -> tuple[float, float]:
+        """(distance, radius) of a disc that all light leaving the lens passes, metres.
+
+        The distance is from the end of the element: the first-order exit pupil, or 0 if that is far away. The
+        radius is found by tracing rays from all over the stop in all directions.
+        """
+        distance = 0.0
+        if self.prescription.stop is not None:
+            pupil = self.first_order.exit_pupil.distance
+            distance = pupil if abs(pupil) < FARTHEST * max(self.prescription.length, 1e-3) else 0.0
+        return distance, PUPIL_MARGIN * self._widest(distance)
+
+    def _widest(self, distance: float) -> float:
+        """The largest distance from the axis at which light meets a plane behind the lens."""
+        number, onward = self._stop_number, self._onward
+        assert number is not None
+        to_stop, behind = onward[: number + 1], onward[number:]
+        back = tuple(_reversed(to_stop)[1:])
+        ahead = (replace(behind[0], distance=0.0), *behind[1:])
+        stop = onward[number]
+        wide = stop.radius if math.isfinite(stop.radius) else max(self._mask_size()) / math.sqrt(2)
+        wide = 1.2 * (wide + stop.softness)  # on a curved stop, its edge is met off the plane of its vertex
+        flight = self._behind + distance
+
+        def met(rays: Array) -> Array:
+            """How far out they meet the plane; -1 for rays that do not pass."""
+            found, share = traced(ahead, rays)
+            _, before = traced(back, rays)
+            away = np.hypot(*(found[..., :2] + flight * found[..., 2:]).T)
+            return np.where((share > 0) & (before > 0), away, -1.0)
+
+        r, s, t = np.meshgrid(
+            np.linspace(0, wide, 13), np.linspace(-2, 2, 81), np.linspace(0, 2, 25), indexing="ij"
+        )
+        rays = np.stack([r, 0 * r, s, t], axis=-1).reshape(-1, 4)
+        away = met(rays)
+        if away.max() < 0:
+            raise InputError(f"no light passes {self.label}: its rims stop all rays from its stop")
+        step = np.array([wide / 12, 0.0, 0.05, 0.083])
+        draw = np.random.default_rng(0)
+        for _ in range(8):
+            best = np.argsort(away)[-40:]
+            rays, away = rays[best], away[best]
+            near = rays + draw.uniform(-1, 1, (60, *rays.shape)) * step
+            rays = np.concatenate([rays, near.reshape(-1, 4)])
+            away = np.concatenate([away, met(near.reshape(-1, 4))])
+            step = step / 2
+        return float(away.max())
+
+    def _mask_size(self) -> tuple[float, float]:
+        assert self.mask is not None
+        if not all(map(math.isfinite, self.mask.size)):
+            raise InputError(f"the mask of {self.label} has no edge, so nothing bounds the light: give it a size")
+        return self.mask.size
+
+    # --- colour
+
+    @property
+    def depends_on_band(self) -> bool:
+        """Whether bands have indices of their own."""
+        return self.dispersion and self.prescription.disperses
+
+    def ways(self, band: Band) -> tuple[Way, ...]:
+        """The lens with the indices of a band.
+
+        Raises:
+            InputError: a band without a wavelength, or outside the range of a glass.
+        """
+        if not self.depends_on_band:
+            return super().ways(band)
+        there = self.prescription.at_wavelength(band.stated(self.label))
+        opening = self._opening()
+        return ((1.0, replace(self, prescription=there, dispersion=False, stop_diameter=opening)),)
+
+    def described(self) -> str:
+        """Focal length, aperture, surfaces and what counts as loss, as text."""
+        lens, count = self.first_order, len(self.prescription.surfaces)
+        words = [f"{count} surfaces"]
+        if math.isfinite(lens.focal_length):
+            words.append(f"focal length {short(lens.focal_length)}")
+        if lens.stop_diameter is not None:
+            words.append(f"stop {short(lens.stop_diameter)}")
+            if math.isfinite(lens.f_number):
+                words.append(f"f/{lens.f_number:.3g}")
+        words += ["a mask at its stop"] if self.mask is not None else []
+        words += ["dispersion"] if self.depends_on_band else []
+        words += [f"{self.radiometry} radiometry"]
+        return ", ".join([*words, f"from {self.source}"] if self.source else words)
+
+
+def _is_empty(surface: Surface, before: float) -> bool:
+    """Whether a surface is only a hole: the same medium on both sides."""
+    return surface.index == before
+
+
+def _reversed(onward: Sequence[Refraction]) -> tuple[Refraction, ...]:
+    """Surfaces as rays traced against the light meet them, from the vertex of the last one on."""
+    found, distance = [], 0.0
+    for surface in reversed(onward):
+        found.append(replace(surface, distance=distance, ratio=1 / surface.ratio))
+        distance = -surface.distance
+    return tuple(found)
+
+
+def _between(onward: tuple[Refraction, ...], ending: float, weighted: bool) -> Aberrations:
+    """The surfaces from the plane where the first one's distance begins to ``ending`` metres behind the last."""
+    back = list(_reversed(onward))
+    back[0] = replace(back[0], distance=-ending)
+    matrix = Affine.identity()
+    for surface in onward:
+        # (n' − n)/R and the slopes' factor n/n' of a surface between media: Hecht, Optics, section 6.2.
+        refraction = np.array([[1.0, 0.0], [-(1 - surface.ratio) * surface.curvature, surface.ratio]])
+        flight = np.array([[1.0, surface.distance], [0.0, 1.0]])
+        matrix = Affine.abcd(refraction @ flight) @ matrix
+    return Aberrations(
+        onward=onward,
+        ending=ending,
+        back=tuple(back),
+        beginning=-onward[0].distance,
+        first_order=Affine.propagation(ending) @ matrix,
+        cosine_fourth=weighted,
+    )
