@@ -54,7 +54,9 @@ def test_derivatives_against_differences(name: str) -> None:
     inner = np.ones(before.shape[1], dtype=bool)
     if np.isfinite(surface.radius):  # rays next to an edge pass it in one of the differences
         met = surface.met(*before)
-        edges = [surface.radius] if not surface.softness else surface.radius + np.array([-0.5, 0.5]) * surface.softness
+        edges = (
+            [surface.radius] if not surface.softness else surface.radius + np.array([-0.5, 0.5]) * surface.softness
+        )
         inner = np.min([np.abs(np.hypot(met.x, met.y) - edge) for edge in edges], axis=0) > 1e-5
     before, weights = before[:, inner], weights[:, inner]
 
@@ -68,7 +70,13 @@ def test_derivatives_against_differences(name: str) -> None:
         moved[axis] = step
         expected = (total(surface, before + moved) - total(surface, before - moved)) / (2 * step)
         np.testing.assert_allclose(back[axis], expected, rtol=2e-5, atol=2e-6 * np.abs(expected).max())
-    for field, step in (("distance", 1e-8), ("curvature", 1e-6), ("conic", 1e-5), ("ratio", 1e-7), ("radius", 1e-9)):
+    for field, step in (
+        ("distance", 1e-8),
+        ("curvature", 1e-6),
+        ("conic", 1e-5),
+        ("ratio", 1e-7),
+        ("radius", 1e-9),
+    ):
         if field == "radius" and not surface.softness:
             continue
         value = getattr(surface, field)
@@ -78,7 +86,9 @@ def test_derivatives_against_differences(name: str) -> None:
     for n, a in enumerate(surface.aspheres):
         step = 1e-5 * abs(a)
         more, less = (surface.aspheres + sign * step * np.eye(len(surface.aspheres))[n] for sign in (1, -1))
-        expected = (total(replace(surface, aspheres=more), before) - total(replace(surface, aspheres=less), before)).sum()
+        expected = (
+            total(replace(surface, aspheres=more), before) - total(replace(surface, aspheres=less), before)
+        ).sum()
         assert own["aspheres"][n] == pytest.approx(expected / (2 * step), rel=1e-4)
     compiled, sums = np.ascontiguousarray(weights), np.zeros(20)
     state = np.concatenate([before, np.ones((1, before.shape[1]))])

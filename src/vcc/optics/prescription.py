@@ -234,15 +234,46 @@ class Prescription(Brief):
             z=z, decentre=decentre, name=name, source=self.source,
         )  # fmt: skip
         checks.one_of("z_of", z_of, get_args(Reference))
-        opening = self._opening(lens, stop_diameter, f_number)
+        opening = self._opening(stop_diameter, f_number)
         if opening is not None:
             lens = dataclasses.replace(lens, stop_from_entrance=self.stop_from_entrance, stop_diameter=opening)
         if z_of == "first surface":
             return lens
         return dataclasses.replace(lens.from_entrance_pupil(z), source=self.source)
 
-    def _opening(self, lens: FirstOrder, stop_diameter: float | None, f_number: float | None) -> float | None:
-        """The stop's diameter: the requested one, else the file's aperture, else that of the stop surface."""
+    def _opening(self, stop_diameter: float | None, f_number: float | None) -> float | None:
+        """The same; warns if it is wider than the file's."""
+        opening = self.opening(stop_diameter, f_number)
+        if opening is None or (stop_diameter is None and f_number is None):
+            return opening
+        assert self.stop is not None
+        try:
+            widest: float | None = self.opening()
+        except InputError:  # the file's aperture is invalid: the user must be able to request another
+            widest = self.stop.diameter
+        if widest is not None and opening > 1.001 * widest:
+            warnings.warn(
+                f"{self.source or 'this prescription'}: a stop of {short(opening)} is wider than that of the "
+                f"prescription ({short(widest)}): rims that would cut this light off are not simulated",
+                ResultWarning,
+                stacklevel=4,  # the caller of load_lens
+            )
+        return opening
+
+    def opening(self, stop_diameter: float | None = None, f_number: float | None = None) -> float | None:
+        """The diameter of the stop, metres: the requested one, else the file's aperture, else its own diameter.
+
+        Args:
+            stop_diameter: metres.
+            f_number: focal length / entrance pupil for a distant scene, as an alternative.
+
+        Returns:
+            None if no stop is marked.
+
+        Raises:
+            InputError: an aperture is requested but no stop is marked, a stop without diameter, both arguments,
+                or an f-number for an afocal system.
+        """
         place = self.source or "this prescription"
         if stop_diameter is not None and f_number is not None:
             raise InputError(f"{place}: give stop_diameter or f_number, not both")
@@ -252,22 +283,10 @@ class Prescription(Brief):
                     f"{place} marks no aperture stop: add a vcc.Mask with patterns.Circle before the lens"
                 )
             return None
+        lens = FirstOrder(self.matrix, self.length)
         if stop_diameter is None and f_number is None:
             return self._own_opening(lens)
-        opening = stop_diameter if f_number is None else self._by_f_number(lens, f_number)
-        assert opening is not None
-        try:
-            widest: float | None = self._own_opening(lens)
-        except InputError:  # the file's aperture is invalid: the user must be able to request another
-            widest = self.stop.diameter
-        if widest is not None and opening > 1.001 * widest:
-            warnings.warn(
-                f"{place}: a stop of {short(opening)} is wider than that of the prescription ({short(widest)}): "
-                "rims that would cut this light off are not simulated",
-                ResultWarning,
-                stacklevel=4,  # the caller of load_lens
-            )
-        return opening
+        return stop_diameter if f_number is None else self._by_f_number(lens, f_number)
 
     def _own_opening(self, lens: FirstOrder) -> float:
         """The stop's diameter from the file's aperture, else that of the stop surface."""

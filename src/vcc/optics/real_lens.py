@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
 from vcc.optics.faces import Element, Faces, Part, Way
 from vcc.optics.first_order import FirstOrder
-from vcc.optics.prescription import Prescription, Surface
+from vcc.optics.prescription import Prescription, Reference, Surface
 from vcc.optics.refraction import Refraction, traced
 from vcc.shapes.patterns import Circle, Pattern
 
@@ -110,6 +110,39 @@ class RealLens(Element):
             if not (isinstance(share, int | float) and 0 < share <= 1):
                 raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share!r}")
 
+    @classmethod
+    def of(
+        cls,
+        prescription: Prescription,
+        *,
+        z: float = 0.0,
+        z_of: Reference = "first surface",
+        stop_diameter: float | None = None,
+        f_number: float | None = None,
+        **options: Any,
+    ) -> RealLens:
+        """A real lens placed by its first surface or by its entrance pupil, opened to an f-number.
+
+        Args:
+            prescription: the surfaces.
+            z: position of the first surface, or of the reference ``z_of``, metres.
+            z_of: ``"first surface"``, or ``"entrance pupil"``, by first order.
+            stop_diameter: metres; None for the stop of the prescription.
+            f_number: focal length / entrance pupil for a distant scene, as an alternative to ``stop_diameter``.
+            options: the other parameters of a `RealLens`.
+
+        Raises:
+            InputError: as in `vcc.RealLens` and `Prescription.opening`; an entrance pupil at infinity.
+        """
+        checks.one_of("z_of", z_of, get_args(Reference))
+        opening, front = prescription.opening(stop_diameter, f_number), 0.0
+        if z_of == "entrance pupil":
+            pupil = prescription.first_order(stop_diameter=opening).entrance_pupil.distance
+            if math.isinf(pupil):
+                raise InputError("the entrance pupil lies at infinity: place the lens by its first surface")
+            front = -pupil
+        return cls(prescription, opening, z=z, front=front, **options)
+
     # --- the lens in first order
 
     @property
@@ -176,17 +209,11 @@ class RealLens(Element):
         flat = math.isinf(stop.radius) and not stop.aspheres
         return number if flat and before == 1.0 == stop.index and 0 < number < len(surfaces) - 1 else None
 
-    def _opening(self) -> float | None:
-        """The diameter of the stop, if one is marked."""
-        if self.prescription.stop is None:
-            return None
-        return self.prescription.first_order(stop_diameter=self.stop_diameter).stop_diameter
-
     @property
     @cached
     def _onward(self) -> tuple[Refraction, ...]:
         """All surfaces as light meets them from the plane z on."""
-        surfaces, opening = self.prescription.surfaces, self._opening()
+        surfaces, opening = self.prescription.surfaces, self.prescription.opening(self.stop_diameter)
         found: list[Refraction] = []
         before = 1.0
         for n, surface in enumerate(surfaces):
@@ -306,7 +333,7 @@ class RealLens(Element):
         if not self.depends_on_band:
             return super().ways(band)
         there = self.prescription.at_wavelength(band.stated(self.label))
-        opening = self._opening()
+        opening = self.prescription.opening(self.stop_diameter)
         return ((1.0, replace(self, prescription=there, dispersion=False, stop_diameter=opening)),)
 
     def described(self) -> str:

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
+from typing import Any, Literal, overload
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded, read_bytes, reading
 from vcc.base.wavelengths import D_LINE
@@ -16,6 +18,7 @@ from vcc.optics.glass import Glass
 from vcc.prescriptions import pbrt, zemax
 from vcc.prescriptions.media import Media
 from vcc.optics.prescription import Prescription, Reference, Surface
+from vcc.optics.real_lens import RealLens
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
 
@@ -50,47 +53,74 @@ def read_prescription(
         return reader(content, file, media)
 
 
+@overload
+def load_lens(path: str | PathLike[str], *, model: Literal["first order"] = ..., **options: Any) -> FirstOrder: ...
+
+
+@overload
+def load_lens(path: str | PathLike[str], *, model: Literal["real"], **options: Any) -> RealLens: ...
+
+
 def load_lens(
     path: str | PathLike[str],
     *,
+    model: Literal["first order", "real"] = "first order",
     z: float = 0.0,
     z_of: Reference = "first surface",
     stop_diameter: float | None = None,
     f_number: float | None = None,
-    wavelength: float = D_LINE,
-    glasses: Mapping[str, float] | None = None,
-    rims: bool = False,
+    wavelength: float | None = None,
+    glasses: Mapping[str, float | Glass] | None = None,
+    rims: bool | None = None,
     decentre: tuple[float, float] = (0.0, 0.0),
     name: str = "",
-) -> FirstOrder:
-    """Read a real lens, reduced to first order; light passes its surfaces in the order of the file.
+    **real: Any,
+) -> FirstOrder | RealLens:
+    """Read a lens; light passes its surfaces in the order of the file.
 
-    Paraxial: principal planes, focal length, stop and pupils are those of the lens; aberrations are not
-        modelled. Of the rims, only the stop (and with ``rims`` the first and the last surface) limits the
-        light. To focus: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
+    ``model="first order"``: paraxial. Principal planes, focal length, stop and pupils are those of the lens;
+    aberrations are not modelled. Of the rims, only the stop (and with ``rims`` the first and the last surface)
+    limits the light.
+
+    ``model="real"``: each ray is refracted by each surface, see `vcc.RealLens`: aberrations, vignetting by all
+    rims, exact irradiance, and colour where the file names its glasses.
+
+    To focus by first order: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
 
     Args:
         path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
+        model: ``"first order"`` or ``"real"``.
         z: position of the first surface, or of the reference ``z_of``, metres.
         z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0, the entrance pupil is in the plane of
             the light field's views, with the lens's glass in front of it; see
             `vcc.FirstOrder.from_entrance_pupil`.
         stop_diameter: diameter of the stop, metres; None for the stop of the file.
         f_number: focal length / entrance pupil for a distant scene, as an alternative to ``stop_diameter``.
-        wavelength: wavelength for catalogue glasses, metres.
-        glasses: refractive indices by name, which override catalogues: ``{"N-BK7": 1.5168}``.
-        rims: whether the rims of the first and the last surface limit the light too.
+        wavelength: for the indices of glasses, metres. None: the d line, 587.56 nm, for a first-order lens; in a
+            real lens each band of light has its own indices where the file names glasses.
+        glasses: refractive indices, or glasses of `vcc.glasses`, by name, which override catalogues:
+            ``{"N-BK7": 1.5168}``.
+        rims: of a first-order lens, whether the rims of the first and the last surface limit the light too.
         decentre: position (x, y) of the lens's axis, metres.
         name: name in messages and plots.
+        real: of a real lens: ``mask``, ``radiometry``, ``transmission`` and ``softness`` of `vcc.RealLens`.
 
     Warns:
         ResultWarning: the stop is opened wider than in the file.
 
     Raises:
-        InputError: as in `read_prescription` and `Prescription.first_order`.
+        InputError: as in `read_prescription`, `Prescription.first_order` and `vcc.RealLens`.
     """
-    prescription = read_prescription(path, wavelength=wavelength, glasses=glasses)
+    checks.one_of("model", model, ("first order", "real"))
+    prescription = read_prescription(path, wavelength=wavelength or D_LINE, glasses=glasses)
+    placed: dict[str, Any] = {"z": z, "z_of": z_of, "stop_diameter": stop_diameter, "f_number": f_number}
+    placed |= {"decentre": decentre, "name": name}
     with reading(path, "a lens"):
-        return prescription.first_order(
-            z=z, z_of=z_of, stop_diameter=stop_diameter, f_number=f_number, rims=rims, decentre=decentre, name=name
-        )
+        if model == "first order":
+            unknown = next(iter(real), None)
+            if unknown is not None:
+                raise InputError(f'{unknown} belongs to real lenses: pass model="real" with it')
+            return prescription.first_order(**placed, rims=bool(rims))
+        if rims is not None:
+            raise InputError("rims belongs to first-order lenses: in a real lens all rims limit the light")
+        return RealLens.of(prescription, **placed, dispersion=wavelength is None, **real)
