@@ -23,7 +23,11 @@ _READERS = {".dat": pbrt.read, ".zmx": zemax.read}
 
 
 def read_prescription(
-    path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float | Glass] | None = None
+    path: str | PathLike[str],
+    *,
+    wavelength: float = D_LINE,
+    glasses: Mapping[str, float | Glass] | None = None,
+    configuration: int | None = None,
 ) -> Prescription:
     """Read the surfaces of a lens from a file, in the order in which light passes them.
 
@@ -47,7 +51,7 @@ def read_prescription(
     content = read_bytes(file, "lens prescription")
     media = Media(wavelength, dict(glasses or {}))
     with reading(file, "a lens prescription"):
-        return reader(content, file, media)
+        return reader(content, file, media, configuration)
 
 
 def load_lens(

@@ -77,7 +77,11 @@ class Prescription(Brief):
         source: name of the file.
         f_number: f-number that the file states for a distant scene; None if the stop's diameter is used.
         entrance_pupil_diameter: diameter that the file states, metres, likewise.
-        image_distance: distance from the last surface to the file's image surface, metres; None if there is none.
+        image_distance: distance from the last surface to the file's image surface, metres; None if the file has
+            none: the paraxial image of a distant scene is at `back_focal_distance`.
+        wavelengths: wavelengths of the design, metres, the main one first; empty if the file states none.
+        fields: angles of the design to the axis, degrees; empty if the file states none or gives heights.
+        configurations: number of configurations in the file (positions of a zoom or of the focus).
 
     Raises:
         InputError: no surface with refractive power, a negative gap, more than one stop, an index below 1, or a
@@ -90,6 +94,9 @@ class Prescription(Brief):
     f_number: float | None = None
     entrance_pupil_diameter: float | None = field(default=None, metadata={"unit": "length"})
     image_distance: float | None = field(default=None, metadata={"unit": "length"})
+    wavelengths: tuple[float, ...] = field(default=(), metadata={"unit": "length"})
+    fields: tuple[float, ...] = ()
+    configurations: int = 1
 
     def __post_init__(self) -> None:
         place = self.source or "this prescription"
