@@ -13,13 +13,19 @@ from vcc.base.reading import expanded, read_bytes, reading
 from vcc.base.wavelengths import D_LINE
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.glass import Glass
-from vcc.prescriptions import pbrt, zemax
+from vcc.prescriptions import codev, json_files, pbrt, zemax
 from vcc.prescriptions.media import Media
 from vcc.prescriptions.model import Prescription, Reference, Surface
 
 __all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
 
-_READERS = {".dat": pbrt.read, ".zmx": zemax.read}
+_READERS = {
+    ".dat": pbrt.read,
+    ".json": json_files.read_optiland,
+    ".roa": json_files.read_rayoptics,
+    ".seq": codev.read,
+    ".zmx": zemax.read,
+}
 
 
 def read_prescription(

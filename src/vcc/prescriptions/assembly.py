@@ -58,11 +58,17 @@ def radius_of(curvature: float, unit: float) -> float:
     return unit / curvature if curvature else math.inf
 
 
+def to_axis(angles: Sequence[tuple[float, float]]) -> tuple[float, ...]:
+    """The angles between rays and the axis, degrees, of their angles in x and in y."""
+    tangents = [math.hypot(*(math.tan(math.radians(angle)) for angle in pair)) for pair in angles]
+    return tuple(math.degrees(math.atan(tangent)) for tangent in tangents)
+
+
 def not_supported(place: str, what: str) -> InputError:
     """The error for a surface that has no place in a lens of surfaces of rotation in line."""
     return InputError(
-        f"{place} is {what}, which is not supported: only spheres, conics and even aspheres are, with glass or air "
-        "behind"
+        f"{place} is {what}, which is not supported: only spheres, conics and even aspheres are, with glass or "
+        "air behind"
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Literal, get_args
@@ -62,6 +63,30 @@ class Surface:
         while terms and terms[-1] == 0:
             terms.pop()
         object.__setattr__(self, "aspheres", tuple(terms))
+
+
+def qcon(terms: Sequence[float], norm_radius: float) -> tuple[float, ...]:
+    """Convert terms of Forbes's strong aspheres (Qcon) to `Surface.aspheres`, exactly.
+
+    The sag beyond the conic is u⁴·Σ aₘ·Qₘ(u²) with u = r/norm_radius, where Qₘ(x) is the Jacobi polynomial
+    Pₘ^(0,4)(2x − 1), whose coefficients are whole numbers. Source: Forbes 2007, Optics Express 15, 5218.
+
+    Args:
+        terms: a₀, a₁ …, metres.
+        norm_radius: metres.
+
+    Returns:
+        As many terms, of r⁴, r⁶ …, in m⁻³, m⁻⁵ …
+
+    Raises:
+        InputError: a norm radius of 0 or less.
+    """
+    norm = checks.above_zero("norm_radius of a Qcon asphere", norm_radius)
+    powers = [
+        sum((-1) ** (m - s) * math.comb(m, s) * math.comb(m + s + 4, m) * a for m, a in enumerate(terms) if m >= s)
+        for s in range(len(terms))
+    ]
+    return tuple(term / norm ** (2 * s + 4) for s, term in enumerate(powers))
 
 
 @dataclass(frozen=True, repr=False)

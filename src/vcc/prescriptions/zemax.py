@@ -28,6 +28,7 @@ from vcc.prescriptions.assembly import (
     radius_of,
     real,
     text_of,
+    to_axis,
     without_r2,
 )
 from vcc.prescriptions.media import AIR, Media, Medium
@@ -68,6 +69,7 @@ _TYPES = {
     "XOSPHERE": "an odd asphere",
     "COORDBRK": "a coordinate break",
     "TILTSURF": "a tilted surface",
+    "QED_TYPE": "a Q-type asphere (vcc.prescriptions.qcon converts the terms of Qcon)",
     "TOROIDAL": "a toroid",
     "BICONICX": "a biconic surface",
     "DGRATING": "a diffraction grating",
@@ -241,9 +243,7 @@ def _fields(head: _Lines) -> tuple[float, ...]:
     if len(kind) < 3 or kind[0] != 0:
         return ()
     pairs = zip(head.values("XFLN"), head.values("YFLN"), strict=False)
-    angles = [(real(x) or 0.0, real(y) or 0.0) for x, y in list(pairs)[: int(min(kind[2] or 0, 1e3))]]
-    tangents = [math.hypot(*(math.tan(math.radians(angle)) for angle in pair)) for pair in angles]
-    return tuple(math.degrees(math.atan(tangent)) for tangent in tangents)
+    return to_axis([(real(x) or 0.0, real(y) or 0.0) for x, y in list(pairs)[: int(min(kind[2] or 0, 1e3))]])
 
 
 def _check_supported(surface: _Lines, file: Path) -> None:
