@@ -1,10 +1,10 @@
 """Sequential lenses from CODE V's command files (.seq): spheres, conics and even aspheres.
 
 A command is a name, sometimes a surface (``S3``), and values; ``;`` and line ends separate commands, ``&`` at the
-end of a line continues it, ``!`` starts a comment. ``SO``, ``S`` and ``SI`` are the object, the next surface and the
-image, each with its radius (curvature after ``RDM N``), the distance to the next surface and the glass behind. The
-commands after a surface belong to it: STO, CIR, K, the terms A to J of r⁴ to r²⁰. Values are those of the first
-zoom position; ``ZOO n`` states n positions, and ``ZOO THI S3 …`` one value for each.
+end of a line continues it, ``!`` starts a comment. ``SO``, ``S`` and ``SI`` are the object, the next surface and
+the image, each with its radius (curvature after ``RDM N``), the distance to the next surface and the glass behind.
+The commands after a surface belong to it: STO, CIR, K, the terms A to J of r⁴ to r²⁰. Values are those of the
+first zoom position; ``ZOO n`` states n positions, and ``ZOO THI S3 …`` one value for each.
 """
 
 from __future__ import annotations
