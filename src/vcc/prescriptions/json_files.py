@@ -1,7 +1,7 @@
 """Lenses of other Python packages: Optiland's JSON (.json) and RayOptics' JSON (.roa).
 
-Both store the attributes of their objects. Lenses of spheres, conics and even aspheres are read as Optiland 0.6 and
-RayOptics 0.9 write them. Lengths are millimetres in Optiland, and in the unit that the file states in RayOptics.
+Both store the attributes of their objects. Lenses of spheres, conics and even aspheres are read as Optiland 0.6
+and RayOptics 0.9 write them. Lengths are millimetres in Optiland, and in RayOptics the unit that the file states.
 """
 
 from __future__ import annotations
