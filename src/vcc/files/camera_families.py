@@ -24,8 +24,8 @@ from vcc.base.errors import InputError
 from vcc.base.reading import expanded
 from vcc.optics import Element, FirstOrder, RealLens, glass
 from vcc.optics.glass import Glass
-from vcc.prescriptions import load_lens
 from vcc.optics.prescription import Reference
+from vcc.prescriptions import load_lens
 from vcc.shapes import by_channel, directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
@@ -182,6 +182,7 @@ class _RealLensFile:
     f_number: float | None = None
     wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
     glasses: dict[str, float] | None = None
+    configuration: int | None = None
     z_of: str = "first surface"
     mask: Pattern | None = None
     radiometry: str = "exact"
