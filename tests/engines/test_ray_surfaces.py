@@ -1,4 +1,4 @@
-"""The compiled step through a real lens's surface against the NumPy one, and both derivatives against differences."""
+"""The compiled step through a lens's surface against the NumPy one, and both derivatives against differences."""
 
 from __future__ import annotations
 
@@ -50,7 +50,6 @@ def test_the_compiled_step_is_the_plain_one(name: str) -> None:
 def test_derivatives_against_differences(name: str) -> None:
     surface, before = SURFACES[name], rays()
     weights = np.random.default_rng(4).standard_normal((5, before.shape[1]))
-    share = surface.refracted(*before)[4]
     inner = np.ones(before.shape[1], dtype=bool)
     if np.isfinite(surface.radius):  # rays next to an edge pass it in one of the differences
         met = surface.met(*before)

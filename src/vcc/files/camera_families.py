@@ -154,7 +154,7 @@ class _LensFile:
             for field in dataclasses.fields(self)[1:]
             if getattr(self, field.name) is not None
         }
-        lens = load_lens(folder / expanded(self.lens_file), **given)
+        lens: FirstOrder = load_lens(folder / expanded(self.lens_file), **given)
         return dataclasses.replace(lens, source=self.lens_file)
 
     @classmethod

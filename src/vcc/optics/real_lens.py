@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 RADIOMETRIES = ("exact", "paraxial")
 """How the irradiance behind a lens counts: by angles (cos⁴θ), or by slopes."""
 PUPIL_STEP = 0.01
-"""Radii of exit windows are rounded up to powers of 1 plus this, so that they stay while a lens changes a little."""
+"""Radii of exit windows are rounded up to powers of 1 plus this, and stay while a lens changes a little."""
 FARTHEST = 100.0
 """An exit pupil farther away than this many lengths of the lens is replaced by the plane behind the lens."""
 
@@ -48,13 +48,13 @@ class RealLens(Element):
             in air.
         front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
         dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
-        radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as behind
-            thin lenses, without the fall-off cos⁴θ.
+        radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as
+            behind thin lenses, without the fall-off cos⁴θ.
         transmission: share of light that each surface transmits: a number for all, or one for each surface.
         fresnel: whether surfaces are without coatings: each then transmits what Fresnel's formulas state for
             unpolarised light, from indices and angle.
-        softness: width over which the edges of stop and rims fall off, metres; 0 is hard. Gradients with respect to
-            what moves an edge against rays need soft edges.
+        softness: width over which the edges of stop and rims fall off, metres; 0 is hard. Gradients with
+            respect to what moves an edge against rays need soft edges.
         source: where the lens comes from, as text.
 
     Raises:
@@ -87,8 +87,8 @@ class RealLens(Element):
         self._check_transmission()
         if self.mask is not None and self._split is None:
             raise InputError(
-                f"{self.label} has no plane for a mask: the stop of {self.prescription.source or 'its prescription'} "
-                "must be a flat surface in air"
+                f"{self.label} has no plane for a mask: the stop of "
+                f"{self.prescription.source or 'its prescription'} must be a flat surface in air, between others"
             )
         if self._stop_number is None:
             raise InputError(
@@ -102,12 +102,13 @@ class RealLens(Element):
         shares = tuple(given) if isinstance(given, Sequence) else (given,) * count
         if len(shares) != count:
             raise InputError(
-                f"transmission of {self.label} has {len(shares)} shares, and the lens has {count} surfaces: give one "
-                "for each, or one number for all"
+                f"transmission of {self.label} has {len(shares)} shares, and the lens has {count} surfaces: give "
+                "one for each, or one number for all"
             )
         for share in shares:
-            if not (isinstance(share, int | float) and 0 < share <= 1):
-                raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share!r}")
+            checks.above_zero(f"transmission of {self.label}", share)
+            if share > 1:
+                raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share:g}")
 
     @classmethod
     def of(
@@ -245,14 +246,14 @@ class RealLens(Element):
         onward, split = self._onward, self._split if self.mask is not None else None
         distance, radius = self.exit_window
         last = Affine.propagation(distance)
-        window = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
+        window: list[Part] = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
         weighted = self.radiometry == "exact"
         if split is None:
             whole = _between(onward, self._behind, weighted)
             return (Faces(deflection=whole), whole.first_order, *window)
         front = _between(onward[:split], onward[split].distance, False)
         rear = _between(onward[split + 1 :], self._behind, weighted)
-        middle = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
+        middle: list[Part] = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
         return (*middle, Faces(deflection=rear), rear.first_order, *window)
 
     def faces(self) -> Faces:
