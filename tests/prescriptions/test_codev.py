@@ -203,7 +203,7 @@ PLAIN = seq(WITH_STOP)
             r"line \d+: 64\.2 follows the radius, the thickness and the glass",
         ),
         ("  STO", "  GLA S1 REFL", r"surface 1 is a mirror"),
-        ("SI 0.0 0.0\n", "", r"lists 6 surfaces: .* and an image SI at the end"),
+        ("SI 0.0 0.0\n", "", r"lists 6 surfaces: .* last an image SI"),
         (PLAIN, "RDM\nSO 0 1\n", r"lists 1 surfaces"),
     ],
 )

@@ -259,8 +259,7 @@ def read(content: bytes, file: Path, media: Media, configuration: int | None) ->
     rows = reader.rows
     if len(rows) < 3 or rows[-1].number >= 0:
         raise InputError(
-            f"{file} lists {len(rows)} surfaces: a CODE V lens has an object SO, surfaces S, and an image SI at the "
-            "end"
+            f"{file} lists {len(rows)} surfaces: a CODE V lens has an object SO, surfaces S, and last an image SI"
         )
     dimension = (reader.system.get("DIM") or ["M"])[0].upper()
     if dimension not in _UNITS:
