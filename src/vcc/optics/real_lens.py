@@ -88,7 +88,7 @@ class RealLens(Element):
                 f"{self.label} has no plane for a mask: the stop of {self.prescription.source or 'its prescription'} "
                 "must be a flat surface in air"
             )
-        if self._stop_number is None:
+        if self.stop_number is None:
             raise InputError(
                 f"nothing bounds the light through {self.label}: its prescription marks no stop and states no "
                 "diameters. Give the surfaces diameters"
@@ -189,7 +189,7 @@ class RealLens(Element):
     # --- surfaces
 
     @property
-    def _stop_number(self) -> int | None:
+    def stop_number(self) -> int | None:
         """The position of the surface that limits the light: the marked stop, or the smallest diameter."""
         surfaces = self.prescription.surfaces
         for n, surface in enumerate(surfaces):
@@ -201,7 +201,7 @@ class RealLens(Element):
     @property
     def _split(self) -> int | None:
         """The position of the stop if a mask can stand in its plane: flat, in air on both sides."""
-        number, surfaces = self._stop_number, self.prescription.surfaces
+        number, surfaces = self.stop_number, self.prescription.surfaces
         if number is None or not surfaces[number].stop:
             return None
         stop = surfaces[number]
@@ -211,7 +211,7 @@ class RealLens(Element):
 
     @property
     @cached
-    def _onward(self) -> tuple[Refraction, ...]:
+    def onward(self) -> tuple[Refraction, ...]:
         """All surfaces as light meets them from the plane z on."""
         surfaces, opening = self.prescription.surfaces, self.prescription.opening(self.stop_diameter)
         found: list[Refraction] = []
@@ -243,7 +243,7 @@ class RealLens(Element):
 
         The exit pupil's disc stops no ray that the surfaces let pass: it is there for rays to be aimed at.
         """
-        onward, split = self._onward, self._split if self.mask is not None else None
+        onward, split = self.onward, self._split if self.mask is not None else None
         distance, radius = self.exit_window
         last = Affine.propagation(distance)
         window = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
@@ -276,7 +276,7 @@ class RealLens(Element):
 
     def _widest(self, distance: float) -> float:
         """The largest distance from the axis at which light meets a plane behind the lens."""
-        number, onward = self._stop_number, self._onward
+        number, onward = self.stop_number, self.onward
         assert number is not None
         to_stop, behind = onward[: number + 1], onward[number:]
         back = tuple(_reversed(to_stop)[1:])
