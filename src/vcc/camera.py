@@ -22,7 +22,7 @@ from vcc.optics.band import Band
 from vcc.optics.bands import refuse, single_way, trains_of
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
-from vcc.optics.focusing import focused_train
+from vcc.optics.focusing import By, focused_train, refocused_train
 from vcc.optics.plenoptic import Plenoptic
 from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
@@ -112,16 +112,32 @@ class Camera(Train):
         train = focused_train(elements, sensor, distance)
         return cls(train.elements, train.sensor, name=name)
 
-    def focused_at(self, distance: float) -> Self:
-        """The same camera with its sensor at the plane where a point is sharp; see `Camera.focused`.
+    def focused_at(
+        self,
+        distance: float,
+        *,
+        by: By = "first order",
+        frequency: float | None = None,
+        fields: Sequence[float] = (0.0,),
+    ) -> Self:
+        """The same camera with its sensor at the plane where a point is sharp.
 
         Args:
             distance: Z, from the point to the entrance plane, metres, positive; ``math.inf`` for a distant scene.
+            by: ``"first order"``: as `Camera.focused`; ``"spot"``: by real rays, where the mean square radius of
+                spots is smallest; ``"mtf"``: where their contrast at a frequency is largest on average along x and
+                y. `vcc.analysis.best_focus` returns the sizes of the spots as well.
+            frequency: of ``"mtf"``, cycles per metre on the sensor.
+            fields: of ``"spot"`` and ``"mtf"``: which points count, alike: their images' distances from the middle
+                of the sensor, as fractions of its half diagonal. The default is the axis alone. The lines F, d
+                and C count alike where the camera disperses.
 
         Raises:
-            InputError: as for `Camera.focused`.
+            InputError: as for `Camera.focused`; by real rays: nothing bounds the light, a diffuser, or a field
+                without light.
         """
-        return type(self).focused(self.elements, self.sensor, distance, name=self.name)
+        train = refocused_train(self.elements, self.sensor, distance, by, frequency, fields)
+        return type(self)(train.elements, train.sensor, name=self.name)
 
     def replace(
         self,

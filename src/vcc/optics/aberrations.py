@@ -78,7 +78,9 @@ class Aberrations(Value):
     @cached
     def without_rims(self) -> Aberrations:
         """The same surfaces without their clear diameters."""
-        free = (tuple(replace(each, radius=np.inf, softness=0.0) for each in way) for way in (self.onward, self.back))
+        free = (
+            tuple(replace(each, radius=np.inf, softness=0.0) for each in way) for way in (self.onward, self.back)
+        )
         onward, back = free
         return replace(self, onward=onward, back=back)
 

@@ -6,7 +6,6 @@ no first-order pupil is assumed. The chief ray passes the middle of the stop.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +17,6 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.units import short
 from vcc.base.wavelengths import wavelength as checked_wavelength
 from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
@@ -77,7 +75,9 @@ class Bundle(Brief):
         return np.asarray(np.abs(np.einsum("n,...nc->...c", self.light / self.light.sum(), waves)))
 
 
-def bands_of(train: Train, wavelengths: Sequence[float] | None) -> tuple[tuple[float | None, ...], tuple[Train, ...]]:
+def bands_of(
+    train: Train, wavelengths: Sequence[float] | None
+) -> tuple[tuple[float | None, ...], tuple[Train, ...]]:
     """Wavelengths, and the train that light of each meets.
 
     Args:
@@ -150,9 +150,10 @@ def _transmission(stage: Stage, rays: Array) -> Array:
 
 
 def from_sensor(train: Train, rays: Array) -> tuple[Array, Array]:
-    """Rays (..., 4) of the sensor at the entrance plane, and the share of light that passes, with exact radiometry.
+    """Rays (..., 4) of the sensor at the entrance plane, and the share of light that passes.
 
-    The irradiance of uniform light at a place of the sensor is the sum of shares times ds·dt.
+    The irradiance of uniform light at a place of the sensor is the sum of shares times ds·dt. With the exact
+    radiometry of real lenses, shares contain cos⁴θ.
 
     Args:
         train: the camera; scattering is ignored.
@@ -215,7 +216,7 @@ class Stop(Brief):
         return found
 
     def places(self, train: Train, rays: Array) -> Array:
-        """Where rays (..., 4) of the entrance plane meet the stop, from its middle, (..., 2), metres; without rims.
+        """Where rays (..., 4) of the entrance plane meet the stop, from its middle, (..., 2), without rims.
 
         Args:
             train: the camera.
@@ -329,7 +330,7 @@ def entrance_box(train: Train, distance: float, field: Any) -> Box:
 
 
 def seen_from_entrance(stage: Stage, distance: float, field: Any) -> Array | None:
-    """The corners of a stage's opening, (4, 2), projected by first order along a point's rays to the entrance plane.
+    """The corners of a stage's opening, (4, 2), projected to the entrance plane along a point's first-order rays.
 
     Args:
         stage: with an opening, else None is returned.
@@ -352,10 +353,11 @@ def _entrance_from(arriving: Affine, distance: float, field: Any) -> Affine | No
 
 
 def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
-    """A box in which to search for light through a real lens: its first rim, else four times its entrance pupil."""
+    """Where to search for light through a real lens: its first rim, else four times its entrance pupil."""
     low, high = box
     lens, bending = stage.element, stage.faces.bending
-    assert isinstance(lens, RealLens) and isinstance(bending, Aberrations)
+    assert isinstance(lens, RealLens)
+    assert isinstance(bending, Aberrations)
     first = bending.onward[0]
     vertex = Affine.propagation(first.distance) @ stage.arriving
     if math.isfinite(first.radius):
@@ -365,7 +367,11 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
         back, reach = _entrance_from(vertex, distance, field), first.radius + aside
     else:
         matrix = lens.prescription.stop_from_entrance
-        pupil = lens.prescription.first_order(stop_diameter=lens.stop_diameter).entrance_pupil if matrix is not None else None
+        pupil = (
+            lens.prescription.first_order(stop_diameter=lens.stop_diameter).entrance_pupil
+            if matrix is not None
+            else None
+        )
         if pupil is None or math.isinf(pupil.distance):
             back, reach = _entrance_from(vertex, distance, field), np.full(2, lens.exit_window[1])
         else:
@@ -378,7 +384,7 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
 
 
 def searched(passes: Any, box: Box, bounded: bool = False) -> Box | None:
-    """The box of points of a plane that pass, with one more cell of the last search on each side; None if none does.
+    """The box of points of a plane that pass, plus a cell of the last search on each side; None if none does.
 
     Args:
         passes: of points (n, 2): a mask (n,).
@@ -448,15 +454,17 @@ def bundle(train: Train, distance: float, field: Any, side: int = SIDE) -> Bundl
     for stage in train.stages:
         if stage.faces.spread is not None:
             raise InputError(
-                f"{stage.element.label} scatters light, so that rays of a point end anywhere: vcc.analysis.psf and mtf "
-                "include it"
+                f"{stage.element.label} scatters light, so that a point has no rays of its own: vcc.analysis.psf and "
+                "mtf include diffusers"
             )
     low, high = entrance_box(train, distance, field)
     rays = rays_from(distance, field, midpoints(low, high, (side, side)))
     at_sensor, light = to_sensor(train, rays)
     lit = light > 0
     if not lit.any():
-        raise InputError(f"no light of the point at ({', '.join(f'{each:.4g}' for each in field)}) reaches the sensor")
+        raise InputError(
+            f"no light of the point at ({', '.join(f'{each:.4g}' for each in field)}) reaches the sensor"
+        )
     stop = Stop.of(train)
     places = stop.places(train, rays[lit])
     radius = stop.radius if math.isfinite(stop.radius) else float(np.abs(places).max()) or 1.0
@@ -541,7 +549,10 @@ def half_diagonal(train: Train) -> float:
 
 
 def irradiance(train: Train, place: Any, side: int = 129) -> float:
-    """The irradiance at a place of the sensor under uniform light of radiance 1: ∫ cosθ dω over the rays that pass.
+    """The irradiance at a place of the sensor under uniform light of radiance 1, by the camera's radiometry.
+
+    Behind a real lens ∫ cosθ dω over the rays that pass; behind thin lenses, and with ``radiometry="paraxial"``,
+    ∫ ds dt.
 
     Args:
         train: the camera at one wavelength; scattering is ignored.
@@ -580,9 +591,7 @@ def irradiance(train: Train, place: Any, side: int = 129) -> float:
 # --- focus
 
 
-def sharpest_shift(
-    bundles: Sequence[Bundle], by: str, frequency: float | None = None
-) -> float:
+def sharpest_shift(bundles: Sequence[Bundle], by: str, frequency: float | None = None) -> float:
     """How far behind the sensor the images of points are sharpest together, metres.
 
     Args:
@@ -606,7 +615,7 @@ def sharpest_shift(
     def loss(at: float) -> float:
         return -float(np.mean([one.contrast(frequency, at) for one in bundles]))
 
-    # The first zero of a disc's contrast is at a defocus of 0.61/(frequency · slope): one lobe to each side is searched.
+    # The first zero of a disc's contrast is at a defocus of 0.61/(frequency · slope).
     steepest = max(math.sqrt(float((one.slopes**2).sum(axis=1).max())) for one in bundles)
     places = shift + np.linspace(-1.5, 1.5, 61) / (frequency * steepest)
     best = int(np.argmin([loss(float(at)) for at in places]))
