@@ -281,7 +281,8 @@ def entrance_box(train: Train, distance: float, field: Any) -> Box:
     """The part of the entrance plane through which the light of a point enters, a rectangle of (low, high).
 
     Openings before the first element that is not affine bound it exactly. Where a real lens follows, it is found
-    by tracing rays; masks count with their sizes.
+    by tracing rays; masks count with their sizes. Where a lens has surfaces without clear diameters, rays far off may
+    reach its stop by absurd ways: only the region around the entrance pupil counts.
 
     Args:
         train: the camera.
@@ -313,6 +314,7 @@ def entrance_box(train: Train, distance: float, field: Any) -> Box:
             lambda places: _passes(train, rays_from(distance, field, places)),
             _into_lens(lens, distance, field, (low, high)),
             bounded=math.isfinite(bending.onward[0].radius),
+            connected=any(each.radius == math.inf and each.ratio != 1 for each in bending.onward),
         )
         if box is None:
             raise InputError(
@@ -383,13 +385,14 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
     return np.maximum(low, corners.min(axis=0)), np.minimum(high, corners.max(axis=0))
 
 
-def searched(passes: Any, box: Box, bounded: bool = False) -> Box | None:
+def searched(passes: Any, box: Box, bounded: bool = False, connected: bool = False) -> Box | None:
     """The box of points of a plane that pass, plus a cell of the last search on each side; None if none does.
 
     Args:
         passes: of points (n, 2): a mask (n,).
         box: in which to begin.
         bounded: whether nothing outside this box can pass.
+        connected: whether only the region counts that is nearest to the middle of the box.
     """
     low, high = box
     found = False
@@ -405,6 +408,7 @@ def searched(passes: Any, box: Box, bounded: bool = False) -> Box | None:
             low, high = low + size / 4, high - size / 4  # an opening smaller than a cell is in the middle
             continue
         found = True
+        lit = _nearest_region(lit) if connected else lit
         inside = [np.flatnonzero(lit.any(axis=axis)) for axis in (0, 1)]
         first, last = (np.array([float(each[end]) for each in inside]) for end in (0, -1))
         low, high = (
@@ -416,6 +420,17 @@ def searched(passes: Any, box: Box, bounded: bool = False) -> Box | None:
         if (high - low <= size).all() and (high - low > 0.8 * size).all():
             break
     return (low, high) if found else None
+
+
+def _nearest_region(lit: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The connected region of a mask that is nearest to its middle."""
+    from scipy.ndimage import label
+
+    regions, _ = label(lit, structure=np.ones((3, 3)))
+    rows, columns = np.nonzero(lit)
+    middle = (np.array(lit.shape) - 1) / 2
+    nearest = int(np.argmin((rows - middle[0]) ** 2 + (columns - middle[1]) ** 2))
+    return np.asarray(regions == regions[rows[nearest], columns[nearest]])
 
 
 def midpoints(low: Array, high: Array, counts: tuple[int, int]) -> Array:
