@@ -313,6 +313,9 @@ def mirrored(element: Any, turn: Array) -> Any:
     match element.kind:
         case "lens" | "first order":
             pass
+        case "real lens":
+            if element.mask is not None:
+                changes["mask"] = _mirrored_pattern(element.mask, turn, table, vector, angle)
         case "prism":
             changes["deflection"] = vector(element.deflection)
         case "mask":
@@ -582,6 +585,8 @@ def flux(case: Case) -> Iterator[Check]:
     camera = vcc.Camera(kept, case.camera.sensor)
     if any(e.kind in ("phase plate", "lens array", "biprism", "pyramid") for e in kept):
         return  # bent by cells and functions: rays have no bound without a stop
+    if any(e.kind == "real lens" for e in kept):
+        return  # its rims absorb
     reach = _reach(camera, field)
     pitch = float(reach.max()) / 24  # what sharpening rings beyond the light's own edge finds room too
     sensor = replace(

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 import vcc
 from tests.physics.random_tracer import Bench, Plane, Scene
 from vcc.base.units import m, mm
+from vcc.optics import prescription
 from vcc.shapes import kernels, patterns, surfaces
 
 Array = NDArray[np.float64]
@@ -51,7 +52,16 @@ AFFINE = (
     "two terms",
 )
 """Kinds of cameras that are made of footprints."""
-BENT = ("facets", "plate", "lenslets", "prism array", "coded diffuser", "diffuser before a mask", "louvre")
+BENT = (
+    "facets",
+    "plate",
+    "lenslets",
+    "prism array",
+    "coded diffuser",
+    "diffuser before a mask",
+    "louvre",
+    "real lens",
+)
 """Kinds that are traced."""
 DIRECTED = ("angle filter", "two terms", "louvre")
 """Kinds that transmit by direction."""
@@ -222,7 +232,10 @@ class _Drawing:
             self.half = (0.65 * self.half[0], 0.65 * self.half[1])  # what fits into the parallelogram
 
     def _optics(self) -> None:
-        """What forms the picture: one lens, two, or a thick one; and prisms where the kind says so."""
+        """What forms the picture: one lens, two, a thick or a real one; and prisms where the kind says so."""
+        if self.kind == "real lens":
+            self._real_lens()
+            return
         z = 0.0 if self.chance(0.4) else self.between(0, 15) * mm
         chance = {"stop, mask and prism": 0.0, "turned lenses": 1.0, "turned mask": 1.0}.get(self.kind, 0.55)
         rim = 2 * min(self.half) * self.between(0.5, 0.85) if self.chance(chance) else None
@@ -260,6 +273,53 @@ class _Drawing:
             )
             self.optics.append(vcc.Mask(pattern, z=self.one_of(0.0, z), decentre=self.off_axis(0.5 * mm)))
         self.lens_z = z
+
+    def _real_lens(self) -> None:
+        """One to three elements of one or two glasses each, some aspheric, a stop before, between or behind."""
+        open_to = min(self.half) * self.between(0.5, 0.8)
+        groups = []
+        for _ in range(self.one_of(1, 2, 3)):
+            bend, index = self.between(-1.5, 1.5), self.between(1.45, 1.85)
+            surfaces = [((1 + bend) / 2, self.between(2, 5), index), ((bend - 1) / 2, self.between(1, 6), 1.0)]
+            if self.chance(0.4):  # cemented
+                surfaces.insert(1, (self.between(-1.2, 0.2), self.between(1, 3), self.between(1.5, 1.8)))
+            groups.append(surfaces)
+        at = int(self.rng.integers(len(groups) + 1))
+        powers = [self.between(0.4, 1.0) for _ in groups]
+        listed: list[prescription.Surface] = []
+        for n, (group, power) in enumerate(zip(groups, powers, strict=True)):
+            if n == at:
+                listed.append(prescription.Surface(np.inf, self.between(0.5, 4) * mm, 1.0, 2 * open_to, True))
+            for c, thickness, index in group:
+                curved = c * power / (40 * mm)
+                odd = self.chance(0.25)
+                aspheres = (self.between(-1, 1) * 1e-6 / mm**3, self.between(-1, 1) * 1e-8 / mm**5) if odd else ()
+                listed.append(
+                    prescription.Surface(
+                        1 / curved if curved else np.inf,
+                        thickness * mm,
+                        index,
+                        2 * open_to * self.between(1.0, 1.5),
+                        conic=self.between(-1.5, 1) if odd else 0.0,
+                        aspheres=aspheres,
+                    )
+                )
+        if at == len(groups):
+            listed.append(prescription.Surface(np.inf, 0.0, 1.0, 2 * open_to, True))
+        if self.chance(0.2):  # no stop is marked: rims alone
+            listed = [replace(each, stop=False) for each in listed]
+        lens = prescription.Prescription(tuple(listed), source="a random lens")
+        z_of = "entrance pupil" if lens.stop is not None and self.chance(0.4) else "first surface"
+        options: dict[str, Any] = {"radiometry": self.one_of("exact", "exact", "paraxial")}
+        if lens.stop is not None and 0 < listed.index(lens.stop) < len(listed) - 1 and self.chance(0.4):
+            options["mask"] = self.one_of(
+                patterns.Polygon(5, 2 * open_to, self.between(0, 1)),
+                patterns.Cells(np.rint(self.rng.random((5, 7))), 2 * open_to),
+            )
+        place = self.between(0, 15) * mm if self.chance(0.6) else 0.0
+        off = self.off_axis(0.8 * mm)
+        self.optics = [vcc.RealLens.of(lens, z=place, z_of=z_of, decentre=off, **options)]
+        self.rim, self.lens_z = 2 * open_to, place + self.optics[0].length
 
     def _sensor(self) -> None:
         """In focus at a plane near where the views converge, with pixels smaller or larger than samples."""
@@ -346,6 +406,7 @@ class _Drawing:
             "angle filter": lambda: [self._angle_filter()],
             "two terms": lambda: [self._angle_filter(), self.one_of(self._mask_behind, self._mask)()],
             "louvre": lambda: [self._louvre()],
+            "real lens": lambda: self.one_of(list, list, self._behind_a_lens)(),
             "facets": lambda: [self._facets()],
             "plate": lambda: [self._plate()],
             "lenslets": lambda: [self._lenslets()],
@@ -442,6 +503,20 @@ class _Drawing:
         wall = pitch * self.one_of(0.0, self.between(0, 0.4))
         turn = self.one_of(0.0, self.between(0, 3))
         return vcc.Louvre(pitch, height, wall, turn, z=z, decentre=self.off_axis(0.5 * pitch))
+
+    def _behind_a_lens(self) -> list[Any]:
+        """One more element, somewhere behind a real lens."""
+        z = self.lens_z + self.between(0.05, 0.95) * (self.sensor.z - self.lens_z)
+        return [
+            self.one_of(
+                lambda: self._mask(z),
+                lambda: vcc.Prism((self.between(-0.02, 0.02), self.between(-0.02, 0.02)), z=z),
+                self._lenslets,
+                self._louvre,
+                self._plate,
+                self._diffuser,
+            )()
+        ]
 
     def _two_masks(self) -> list[Any]:
         first = self._mask()

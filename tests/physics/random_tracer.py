@@ -382,6 +382,7 @@ class Sheet:
         bend: (Δs, Δt) as functions of position, or None, with bounds of both.
         openings: all openings that light must pass.
         scatter: (δs, δt) as functions of three uniform numbers and positions, or None, with bounds of both.
+        traced: rays just behind to rays just before, and the share that passes; ``affine`` is then its first order.
     """
 
     step: Array
@@ -390,6 +391,7 @@ class Sheet:
     openings: list[Opening] = field(default_factory=list)
     scatter: Callable[..., tuple[Array, Array]] | None = None
     reach: tuple[float, float] = (0.0, 0.0)
+    traced: Callable[[tuple[Array, ...]], tuple[tuple[Array, ...], Array]] | None = None
 
 
 def _flight(distance: float) -> Array:
@@ -615,6 +617,8 @@ def _sheets(element: Any) -> list[Sheet]:
             return [Sheet(ahead, openings=_pattern(element.pattern, middle)), Sheet(_undone(ahead))]
         case "Louvre":
             return _louvre(element)
+        case "RealLens":
+            return _real_lens(element)
     raise NotImplementedError(type(element).__name__)
 
 
@@ -639,6 +643,100 @@ def _louvre(element: Any) -> list[Sheet]:
         return np.asarray((one == other) & inside, dtype=np.float64)
 
     return [Sheet(step, openings=[Smooth(0.0, 0.0, same_gap)]), Sheet(_undone(step))]
+
+
+def _real_lens(element: Any) -> list[Sheet]:
+    """Two sheets: all surfaces, from the element's end back to its beginning, and the last rim to aim at."""
+    x0, y0 = element.decentre
+    surfaces = element.prescription.surfaces
+    opening = element.prescription.opening(element.stop_diameter)
+    vertices = element.front + np.concatenate([[0.0], np.cumsum([each.thickness for each in surfaces[:-1]])])
+    before = [1.0, *(each.index for each in surfaces[:-1])]
+    end = max(vertices[-1], 0.0)
+    first_order, here = np.eye(4, 5), 0.0
+    for each, n, vertex in zip(surfaces, before, vertices, strict=True):
+        bent = np.eye(4, 5)
+        bent[2, 0] = bent[3, 1] = -(each.index - n) / each.index / each.radius
+        bent[2, 2] = bent[3, 3] = n / each.index
+        first_order, here = _then(bent, _then(_flight(vertex - here), first_order)), vertex
+    first_order = _then(_flight(end - here), first_order)
+
+    def traced(ray: tuple[Array, ...]) -> tuple[tuple[Array, ...], Array]:
+        x, y, s, t = ray
+        weight = 1 / (1 + s * s + t * t) ** 2 if element.radiometry == "exact" else np.ones(s.shape)
+        place = np.stack([x - x0, y - y0, np.full(s.shape, end)])
+        way = -np.stack([s, t, np.ones(s.shape)]) / np.sqrt(1 + s * s + t * t)  # against the light
+        for each, n, vertex in reversed(list(zip(surfaces, before, vertices, strict=True))):
+            place = _on_surface(place, way, each, vertex)
+            away = np.hypot(place[0], place[1])
+            wide = opening if each.stop and element.mask is None else None if each.stop else each.diameter
+            if wide is not None:
+                weight = np.where(away <= wide / 2, weight, 0.0)
+            if each.stop and element.mask is not None:
+                for one in _pattern(element.mask, (0.0, 0.0)):
+                    weight = weight * one.at(place[0], place[1])
+            steep = _sag(each, away)[1]
+            normal = np.stack([steep * place[0], steep * place[1], -np.ones(away.shape)])
+            normal[:2] /= np.maximum(away, 1e-300)
+            normal /= np.sqrt((normal**2).sum(axis=0))
+            cosine, ratio = -(way * normal).sum(axis=0), each.index / n
+            normal, cosine = np.where(cosine < 0, -normal, normal), np.abs(cosine)
+            inner = 1 - ratio**2 * (1 - cosine**2)
+            weight = np.where((inner > 0) & np.isfinite(away), weight, 0.0)
+            way = ratio * way + (ratio * cosine - np.sqrt(np.maximum(inner, 0.0))) * normal
+        s, t = way[0] / way[2], way[1] / way[2]
+        x, y = place[0] - place[2] * s + x0, place[1] - place[2] * t + y0
+        return tuple(np.where(weight > 0, each, 0.0) for each in (x, y, s, t)), weight
+
+    # A ray within the last rim meets the plane of its vertex at most by its sag times its slope further out.
+    last = Disc(x0, y0, 0.6 * surfaces[-1].diameter)
+    flight = _flight(end - vertices[-1])
+    return [
+        Sheet(np.eye(4, 5), _about((x0, y0), first_order), traced=traced),
+        Sheet(_undone(flight), openings=[_Aimed(last)]),
+        Sheet(flight),
+    ]
+
+
+class _Aimed(Opening):
+    """A disc to aim at, which stops nothing."""
+
+    def __init__(self, disc: Disc) -> None:
+        self.bounds = disc.bounds
+
+    def at(self, x: Array, y: Array) -> Array:
+        return np.ones(np.broadcast_shapes(x.shape, y.shape))
+
+
+def _sag(surface: Any, r: Array) -> tuple[Array, Array]:
+    """(z, dz/dr) of a conic with even powers added: z from its own quadratic, c·r² − 2z + c(1 + k)z² = 0."""
+    c, shape = 1 / surface.radius, (1 + surface.conic) / surface.radius
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(1 - c * shape * r * r)
+        z = c * r * r / 2 if shape == 0 else (1 - root) / shape
+    slope = c * r / root
+    for n, a in enumerate(surface.aspheres):
+        z, slope = z + a * r ** (2 * n + 4), slope + (2 * n + 4) * a * r ** (2 * n + 3)
+    return z, slope
+
+
+def _on_surface(place: Array, way: Array, surface: Any, vertex: float) -> Array:
+    """Where rays meet a surface: the secant method along the ray, from the plane of the vertex on."""
+
+    def above(h: Array) -> Array:
+        at = place + h * way
+        return np.asarray(at[2] - vertex - _sag(surface, np.hypot(at[0], at[1]))[0])
+
+    one = (vertex - place[2]) / way[2]
+    other = one + 1e-4
+    with np.errstate(invalid="ignore", divide="ignore"):
+        f, g = above(one), above(other)
+        for _ in range(12):
+            step = np.where(g == f, 0.0, g * (other - one) / np.where(g == f, 1.0, g - f))
+            one, f = other, g
+            other = other - step
+            g = above(other)
+    return place + other * way
 
 
 def _first_order_sheets(element: Any) -> list[Sheet]:
@@ -789,7 +887,7 @@ class Bench:
     @property
     def affine(self) -> bool:
         """Whether `by_means` can be had: nothing bends or scatters otherwise, and the axes stay apart."""
-        plain = all(sheet.bend is None and sheet.scatter is None for sheet in self.sheets)
+        plain = all(sheet.bend is sheet.scatter is sheet.traced is None for sheet in self.sheets)
         mixing = [step for sheet in self.sheets for step in (sheet.step, sheet.affine) if step is not None]
         return plain and not any(step[[0, 0, 1, 1, 2, 2, 3, 3], [1, 3, 0, 2, 1, 3, 0, 2]].any() for step in mixing)
 
@@ -813,7 +911,9 @@ class Bench:
     def aim(self) -> Aim:
         """At what bounds the rays most: of the smallest solid angle."""
         best = None
-        for sheet, (back, bent) in zip(self.sheets, self._back_to(), strict=True):
+        aimed = list(zip(self.sheets, self._back_to(), strict=True))
+        lens = max((n for n, sheet in enumerate(self.sheets) if sheet.traced is not None), default=-1)
+        for sheet, (back, bent) in aimed[lens + 1 :]:  # first order does not lead exactly through a real lens
             for opening in sheet.openings:
                 if opening.bounds is None:
                     continue
@@ -961,7 +1061,10 @@ class Bench:
                 added = sheet.bend(x, y)
                 s, t = s - added[0], t - added[1]
             ray = (x, y, s, t)
-            if sheet.affine is not None:
+            if sheet.traced is not None:
+                ray, share = sheet.traced(ray)
+                through = through * share
+            elif sheet.affine is not None:
                 ray = _applied(_undone(sheet.affine), ray)
             last = ray
             ray = _applied(_undone(sheet.step), ray)
@@ -985,9 +1088,11 @@ class Bench:
         X = self.x.mean() + (drawn[0] - 0.5) * (np.ptp(self.x) + self.sides[1])
         Y = self.y.mean() + (drawn[1] - 0.5) * (np.ptp(self.y) + self.sides[0])
         a, b = (aim.middle[n] + (2 * drawn[2 + n] - 1) * aim.half[n] for n in (0, 1))
-        at_views, _ = self._walked(_applied(aim.rays, (X, Y, a, b)), drawn[4:])
+        at_views, through = self._walked(_applied(aim.rays, (X, Y, a, b)), drawn[4:])
         place = _applied(_undone(frame[:4]), _applied(self.home, at_views))
         within = self.sheets[0].openings[0].at(at_views[0], at_views[1]) > 0
+        if any(sheet.traced is not None for sheet in self.sheets):
+            within &= through > 0  # what a real lens stops has no way beyond it
         used = np.stack(place[2:])[:, within if within.any() else ~within]
         return used.min(axis=1), used.max(axis=1), float(within.mean())
 

@@ -268,10 +268,13 @@ class RealLens(Element):
         The distance is from the end of the element: the first-order exit pupil, or 0 if that is far away. The
         radius is found by tracing rays from all over the stop in all directions.
         """
-        distance = 0.0
-        if self.prescription.stop is not None:
-            pupil = self.first_order.exit_pupil.distance
-            distance = pupil if abs(pupil) < FARTHEST * max(self.prescription.length, 1e-3) else 0.0
+        number, length = self._stop_number, max(self.prescription.length, 1e-3)
+        assert number is not None
+        behind = Affine.propagation(self._behind) @ _first_order(self._onward[number + 1 :])
+        exit_from_slope, slope_from_slope = behind.linear[0, 2], behind.linear[2, 2]
+        # The image of the stop: where rays from its middle meet the axis again.
+        far = abs(exit_from_slope) >= FARTHEST * length * abs(slope_from_slope)
+        distance = 0.0 if far else float(-exit_from_slope / slope_from_slope)
         return distance, PUPIL_MARGIN * self._widest(distance)
 
     def _widest(self, distance: float) -> float:
@@ -370,17 +373,22 @@ def _between(onward: tuple[Refraction, ...], ending: float, weighted: bool) -> A
     """The surfaces from the plane where the first one's distance begins to ``ending`` metres behind the last."""
     back = list(_reversed(onward))
     back[0] = replace(back[0], distance=-ending)
-    matrix = Affine.identity()
-    for surface in onward:
-        # (n' − n)/R and the slopes' factor n/n' of a surface between media: Hecht, Optics, section 6.2.
-        refraction = np.array([[1.0, 0.0], [-(1 - surface.ratio) * surface.curvature, surface.ratio]])
-        flight = np.array([[1.0, surface.distance], [0.0, 1.0]])
-        matrix = Affine.abcd(refraction @ flight) @ matrix
     return Aberrations(
         onward=onward,
         ending=ending,
         back=tuple(back),
         beginning=-onward[0].distance,
-        first_order=Affine.propagation(ending) @ matrix,
+        first_order=Affine.propagation(ending) @ _first_order(onward),
         cosine_fourth=weighted,
     )
+
+
+def _first_order(onward: Sequence[Refraction]) -> Affine:
+    """The first-order map of rays through surfaces, from the plane where the first one's distance begins."""
+    found = Affine.identity()
+    for surface in onward:
+        # (n' − n)/R and the slopes' factor n/n' of a surface between media: Hecht, Optics, section 6.2.
+        refraction = np.array([[1.0, 0.0], [-(1 - surface.ratio) * surface.curvature, surface.ratio]])
+        flight = np.array([[1.0, surface.distance], [0.0, 1.0]])
+        found = Affine.abcd(refraction @ flight) @ found
+    return found
