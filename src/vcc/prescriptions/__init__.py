@@ -5,52 +5,82 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from os import PathLike
+from pathlib import Path
 from typing import Any, Literal, overload
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded, read_bytes, reading
+from vcc.base.reading import expanded, is_file, read_bytes, reading
 from vcc.base.wavelengths import D_LINE
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.glass import Glass
-from vcc.prescriptions import pbrt, zemax
-from vcc.prescriptions.media import Media
-from vcc.optics.prescription import Prescription, Reference, Surface
+from vcc.optics.prescription import Prescription, Reference, Surface, qcon
 from vcc.optics.real_lens import RealLens
+from vcc.prescriptions import codev, json_files, pbrt, zemax
+from vcc.prescriptions.media import Media
 
-__all__ = ["Prescription", "Surface", "load_lens", "read_prescription"]
+__all__ = ["Prescription", "Surface", "built_in_lenses", "load_lens", "qcon", "read_prescription"]
 
-_READERS = {".dat": pbrt.read, ".zmx": zemax.read}
+_READERS = {
+    ".dat": pbrt.read,
+    ".json": json_files.read_optiland,
+    ".roa": json_files.read_rayoptics,
+    ".seq": codev.read,
+    ".zmx": zemax.read,
+}
+_FORMATS = (".dat (PBRT)", ".json (Optiland)", ".roa (RayOptics)", ".seq (CODE V)", ".zmx (Zemax)")
+_BUILT_IN = Path(__file__).parent / "data"
 
 
 def read_prescription(
-    path: str | PathLike[str], *, wavelength: float = D_LINE, glasses: Mapping[str, float | Glass] | None = None
+    path: str | PathLike[str],
+    *,
+    wavelength: float = D_LINE,
+    glasses: Mapping[str, float | Glass] | None = None,
+    configuration: int | None = None,
 ) -> Prescription:
     """Read the surfaces of a lens from a file, in the order in which light passes them.
 
     Args:
-        path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
-        wavelength: wavelength for catalogue glasses, metres; a ``.dat`` states indices at one wavelength only.
+        path: a PBRT lens table (``.dat``), a sequential file of Zemax (``.zmx``) or CODE V (``.seq``), a lens of
+            Optiland (``.json``) or RayOptics (``.roa``); or one of `built_in_lenses`, if there is no such file.
+        wavelength: wavelength of the indices, metres; a ``.dat`` states them at one wavelength only.
         glasses: refractive indices, or glasses of `vcc.glasses`, by name, which override catalogues:
             ``{"N-BK7": 1.5168}``.
+        configuration: number of the configuration (Zemax) or zoom position (CODE V), from 1; None for the one
+            that was active when the file was saved.
 
     Raises:
         InputError: no such file, another file format, an invalid line, a surface that is not supported (mirror,
-            coordinate break, grating …), or an unknown glass. The message names the file and the
-            surface or line.
+            coordinate break, grating …), an unknown glass, or a configuration that does not exist or changes what
+            cannot be changed here. The message names the file and the surface or line.
     """
     file = expanded(path)
-    reader = _READERS.get(file.suffix.lower())
+    own = file.name in built_in_lenses() and not is_file(file)
+    reader = codev.read if own else _READERS.get(file.suffix.lower())
     if reader is None:
         raise InputError(
-            f"{file} is not a lens prescription that can be read: known are .dat (PBRT) and .zmx (Zemax)"
+            f"{file} is not a lens prescription that can be read: known are {', '.join(_FORMATS)}, and the names "
+            f"{', '.join(built_in_lenses())}"
         )
+    if own:
+        file = _BUILT_IN / f"{file.name}.seq"
     content = read_bytes(file, "lens prescription")
     media = Media(wavelength, dict(glasses or {}))
     with reading(file, "a lens prescription"):
-        return reader(content, file, media)
+        read = reader(content, file, media, configuration)
+    return dataclasses.replace(read, source=file.stem) if own else read
+
+
+def built_in_lenses() -> tuple[str, ...]:
+    """The names of the lenses that come with the package, which `read_prescription` and `vcc.load_lens` accept.
+
+    Each is a file of CODE V in ``vcc/prescriptions/data``, with its source: a patent or a table in a book.
+    """
+    return tuple(sorted(file.stem for file in _BUILT_IN.glob("*.seq")))
 
 
 @overload
@@ -88,7 +118,7 @@ def load_lens(
     To focus by first order: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
 
     Args:
-        path: a PBRT lens table (``.dat``) or a sequential Zemax file (``.zmx``).
+        path: a file or a name, as in `read_prescription`.
         model: ``"first order"`` or ``"real"``.
         z: position of the first surface, or of the reference ``z_of``, metres.
         z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0, the entrance pupil is in the plane of

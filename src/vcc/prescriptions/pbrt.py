@@ -12,18 +12,20 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
+from vcc.prescriptions.assembly import no_configuration
 from vcc.prescriptions.media import Media
 from vcc.optics.prescription import Prescription, Surface
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")
 
 
-def read(content: bytes, file: Path, media: Media) -> Prescription:
+def read(content: bytes, file: Path, media: Media, configuration: int | None) -> Prescription:
     """Read the prescription in a PBRT lens table; its indices are for one wavelength, so ``media`` is not used.
 
     Raises:
         InputError: no surfaces, or a line that is not four numbers. The message names file and line.
     """
+    no_configuration(configuration, file)
     text = content.decode("utf-8-sig", errors="replace")
     surfaces: list[Surface] = []
     remarks: list[str] = []
