@@ -268,9 +268,9 @@ class RealLens(Element):
         The distance is from the end of the element: the first-order exit pupil, or 0 if that is far away. The
         radius is found by tracing rays from all over the stop in all directions.
         """
-        number, length = self._stop_number, max(self.prescription.length, 1e-3)
+        number, length = self.stop_number, max(self.prescription.length, 1e-3)
         assert number is not None
-        behind = Affine.propagation(self._behind) @ _first_order(self._onward[number + 1 :])
+        behind = Affine.propagation(self._behind) @ _first_order(self.onward[number + 1 :])
         exit_from_slope, slope_from_slope = behind.linear[0, 2], behind.linear[2, 2]
         # The image of the stop: where rays from its middle meet the axis again.
         far = abs(exit_from_slope) >= FARTHEST * length * abs(slope_from_slope)
