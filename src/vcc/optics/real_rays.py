@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -94,7 +95,13 @@ def bands_of(
     listed = tuple(checked_wavelength("a wavelength", each) for each in wavelengths)
     if not listed:
         raise InputError("wavelengths is empty: name at least one, in metres, such as 550 * nm")
-    return listed, tuple(single_way(train, Band(wavelength=each)) for each in listed)
+    return listed, tuple(_at_wavelength(train, each) for each in listed)
+
+
+@lru_cache(maxsize=32)
+def _at_wavelength(train: Train, wavelength: float) -> Train:
+    """The train that light of a wavelength meets; kept, since its lenses find their windows by many rays."""
+    return single_way(train, Band(wavelength=wavelength))
 
 
 def rays_from(distance: float, field: Any, places: Array) -> Array:
@@ -149,7 +156,7 @@ def _transmission(stage: Stage, rays: Array) -> Array:
         return np.broadcast_to(np.asarray(stage.faces.pattern(x, y), dtype=np.float64), x.shape)
 
 
-def from_sensor(train: Train, rays: Array) -> tuple[Array, Array]:
+def from_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Array]:
     """Rays (..., 4) of the sensor at the entrance plane, and the share of light that passes.
 
     The irradiance of uniform light at a place of the sensor is the sum of shares times ds·dt. With the exact
@@ -158,6 +165,7 @@ def from_sensor(train: Train, rays: Array) -> tuple[Array, Array]:
     Args:
         train: the camera; scattering is ignored.
         rays: metres and slopes at the sensor.
+        rims: False: without clear diameters and masks, as in `to_sensor`; rays that miss a surface become NaN.
     """
     share, onward = np.ones(rays.shape[:-1]), train.approach_to_sensor
     for stage in reversed(train.stages):
@@ -166,7 +174,8 @@ def from_sensor(train: Train, rays: Array) -> tuple[Array, Array]:
         middle = [*stage.element.decentre, 0.0, 0.0]
         if isinstance(bending, Aberrations):
             behind = bending.first_order(rays - middle)
-            rays, passed = bending.back_through(behind)
+            rays, passed = (bending if rims else bending.without_rims).back_through(behind)
+            rays = rays if rims else np.where(passed[..., None] > 0, rays, np.nan)
             if bending.cosine_fourth:
                 passed = passed / (1 + (behind[..., 2:] ** 2).sum(axis=-1)) ** 2
             rays, share = rays + middle, share * passed
@@ -175,7 +184,7 @@ def from_sensor(train: Train, rays: Array) -> tuple[Array, Array]:
         elif bending is not None:
             s, t = stage.bent(rays[..., 0], rays[..., 1])
             rays = rays - np.stack([0 * s, 0 * s, s, t], axis=-1)
-        share = share * _transmission(stage, rays)
+        share = share * _transmission(stage, rays) if rims else share
     return np.asarray(onward.inverse()(rays)), share
 
 
@@ -188,7 +197,8 @@ class Stop(Brief):
 
     Args:
         stages: that rays cross before it.
-        surfaces: of the real lens that the next stage is, up to the stop; 0: the stop is where that stage begins.
+        surfaces: of the real lens that the next stage is, up to the stop, the last of which is the stop; 0: the stop
+            is where that stage begins.
         radius: metres; infinite if unknown.
     """
 
@@ -231,8 +241,10 @@ class Stop(Brief):
         if not self.surfaces:
             return np.asarray(rays[..., :2])
         assert isinstance(stage.faces.bending, Aberrations)
-        found, share = traced(stage.faces.bending.without_rims.onward[: self.surfaces], rays)
-        return np.where(share[..., None] > 0, found[..., :2], np.nan)
+        *before, surface = stage.faces.bending.without_rims.onward[: self.surfaces]
+        found, share = traced(tuple(before), rays)
+        met = surface.met(*np.moveaxis(found, -1, 0))
+        return np.where(share[..., None] > 0, np.stack([met.x, met.y], axis=-1), np.nan)
 
 
 def chief_rays(train: Train, distance: float, *, slopes: Any = None, places: Any = None) -> Array:
@@ -563,7 +575,7 @@ def half_diagonal(train: Train) -> float:
 # --- illumination
 
 
-def irradiance(train: Train, place: Any, side: int = 129) -> float:
+def irradiance(train: Train, place: Any, side: int = 129) -> tuple[float, float]:
     """The irradiance at a place of the sensor under uniform light of radiance 1, by the camera's radiometry.
 
     Behind a real lens ∫ cosθ dω over the rays that pass; behind thin lenses, and with ``radiometry="paraxial"``,
@@ -573,6 +585,9 @@ def irradiance(train: Train, place: Any, side: int = 129) -> float:
         train: the camera at one wavelength; scattering is ignored.
         place: (x, y), metres.
         side: rays along each side of the box of slopes around the light.
+
+    Returns:
+        The irradiance, and the area of the stop through which light arrives, m²; both 0 where none does.
 
     Raises:
         InputError: nothing bounds the slopes of light.
@@ -598,9 +613,14 @@ def irradiance(train: Train, place: Any, side: int = 129) -> float:
         raise InputError("nothing bounds the light that reaches the sensor: give the lens a diameter")
     box = searched(lambda slopes: from_sensor(train, rays(slopes))[1] > 0, (low, high), bounded=True)
     if box is None:
-        return 0.0
-    _, share = from_sensor(train, rays(midpoints(*box, (side, side))))
-    return float(share.sum() * np.prod(box[1] - box[0])) / side**2
+        return 0.0, 0.0
+    slopes = midpoints(*box, (side, side))
+    _, share = from_sensor(train, rays(slopes))
+    stop = Stop.of(train).places(train, from_sensor(train, rays(slopes), rims=False)[0]).reshape(side, side, 2)
+    by_t, by_s = np.gradient(stop, axis=(0, 1))
+    covered = np.abs(by_s[..., 0] * by_t[..., 1] - by_s[..., 1] * by_t[..., 0]).ravel()
+    area = float(np.nansum(np.where(share > 0, covered, 0.0)))
+    return float(share.sum() * np.prod(box[1] - box[0])) / side**2, area
 
 
 # --- focus
