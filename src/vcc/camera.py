@@ -11,6 +11,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.colour import colour_section, middle_of
 from vcc.advice.explain import Explanation, explained
 from vcc.advice.of_images import Cautions
+from vcc.advice.real_lens import lens_section
 from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress, part_of
@@ -499,11 +500,15 @@ class Camera(Train):
             progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
         """
-        chosen = How.of(how, options)
+        text = self._explained(light_field, How.of(how, options), executor, progress)
+        section = lens_section(self, light_field.grid.wavelengths)
+        return text.with_section(section) if section else text
+
+    def _explained(self, light_field: Samples, how: How, executor: Any, progress: Progress | None) -> Explanation:
         if self.depends_on_bands:
-            return self._explained_by_bands(light_field, chosen, executor, progress)
-        plan = self.compile(light_field, chosen, progress=progress)
-        return explained(self, light_field, plan, chosen, executor)
+            return self._explained_by_bands(light_field, how, executor, progress)
+        plan = self.compile(light_field, how, progress=progress)
+        return explained(self, light_field, plan, how, executor)
 
     def _explained_by_bands(
         self, light_field: Samples, how: How, executor: Any, progress: Progress | None
@@ -515,9 +520,7 @@ class Camera(Train):
             raise InputError("nothing passes this camera in any channel: there is no plan to explain")
         shown = middle_of(trains, grid.wavelengths)
         one = type(self)(trains[shown].train.elements, trains[shown].train.sensor, name=self.name)
-        text = one.explain(
-            SomeChannels.of(light_field, trains[shown].channels), how, executor=executor, progress=progress
-        )
+        text = one._explained(SomeChannels.of(light_field, trains[shown].channels), how, executor, progress)
         return text.with_section(colour_section(self, trains, grid, shown))
 
     def light_field_at(

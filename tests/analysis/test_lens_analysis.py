@@ -135,7 +135,7 @@ def glass(index: float = 1.5) -> Prescription:
 
 
 def test_illumination_behind_a_stop_is_that_of_a_disc() -> None:
-    """E = π/2·(1 − (h² + d² − R²)/√((h² + d² + R²)² − 4·h²·R²)) of radiance 1, R at distance d and height h.
+    """E = π/2·(1 − (h² + d² − R²)/√((h² + d² + R²)² − 4·h²·R²)) for radiance 1, at distance d and height h.
 
     Foote 1915, Bulletin of the Bureau of Standards 12, 583; cos⁴θ for small discs.
     """
@@ -188,7 +188,7 @@ def test_colour_of_a_singlet() -> None:
 
 
 def test_best_focus_of_spherical_aberration_is_two_thirds_of_the_way() -> None:
-    """Of third order, x = a·ρ³ + b·ρ: the mean square over the pupil is least for b = −2a/3 (Born and Wolf, 9.3)."""
+    """Of third order, x = a·ρ³ + b·ρ: the mean square over the pupil is least for b = −2a/3."""
     lens = vcc.RealLens(glass(), stop_diameter=4 * mm)
     camera = vcc.Camera.focused([lens], vcc.Sensor(z=0, shape=(100, 100), pitch=10 * um), FAR)
     found = analysis.best_focus(camera, FAR)
@@ -255,7 +255,7 @@ def test_a_lens_alone_has_angles() -> None:
 
 
 def test_what_has_no_answer_is_refused(gauss: vcc.Camera) -> None:
-    with pytest.raises(vcc.InputError, match="0.5 of the half diagonal|no chief ray"):
+    with pytest.raises(vcc.InputError, match="no chief ray"):
         analysis.spots(gauss, 2.0, fields=[40.0])
     with pytest.raises(vcc.InputError, match="does not disperse"):
         analysis.lateral_colour(gauss, 2.0)
@@ -269,7 +269,7 @@ def test_what_has_no_answer_is_refused(gauss: vcc.Camera) -> None:
         )
     with pytest.raises(vcc.InputError, match="not a float"):
         analysis.spots(3.0)
-    with pytest.raises(vcc.InputError, match="between -90|between −90"):
+    with pytest.raises(vcc.InputError, match="between −90"):
         analysis.spots(gauss, angles=[2.0])
 
 

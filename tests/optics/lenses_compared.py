@@ -1,6 +1,6 @@
 """Lenses that other programs trace too, and what these say of them. Prescriptions are facts, in millimetres.
 
-`figures_of_optiland` and `figures_of_rayoptics` compute the figures, where these packages are installed. Run as a
+`figures_of_optiland` and `figures_of_rayoptics` compute the figures, where these packages are installed. As a
 program, this file prints lenses_compared.json. All indices are plain numbers, so that only the optics is compared.
 """
 
@@ -16,7 +16,7 @@ INF = math.inf
 Row = tuple[float, ...]
 
 LENSES: dict[str, dict[str, Any]] = {
-    # (radius, thickness, index behind, conic, r⁴, r⁶), the stop's number, the diameter of the entrance pupil, a field
+    # (radius, thickness, index behind, conic, r⁴, r⁶), the stop's number, the entrance pupil's diameter, a field
     "singlet": {  # stop on its second surface; Zemax's figures: Optiland issue 710
         "rows": [(63.73364157, 10.0, 1.69099596), (653.2939232, 92.7383463, 1.0)],
         "stop": 1, "pupil": 25.0, "angle": 5.0,
@@ -39,15 +39,16 @@ LENSES: dict[str, dict[str, Any]] = {
     "Tessar": {  # Laikin, Lens Design, 4th ed., p. 63, inches times 25.4
         "rows": [
             (33.85566, 7.08914, 1.62296), (-253.37516, 5.21716, 1.0), (-53.12918, 2.286, 1.62004),
-            (30.79242, 1.80086, 1.0), (INF, 3.89636, 1.0), (-191.0207, 2.286, 1.50137), (33.0454, 8.60806, 1.62296),
-            (-38.65372, 86.4235, 1.0),
+            (30.79242, 1.80086, 1.0), (INF, 3.89636, 1.0), (-191.0207, 2.286, 1.50137),
+            (33.0454, 8.60806, 1.62296), (-38.65372, 86.4235, 1.0),
         ],
         "stop": 4, "pupil": 22.0, "angle": 20.5,
     },
     "telephoto": {  # Laikin, p. 91, inches times 25.4
         "rows": [
-            (21.81606, 6.07314, 1.5168), (-68.33108, 2.286, 1.66446), (77.00772, 1.22174, 1.0), (INF, 26.28138, 1.0),
-            (-14.5161, 2.286, 1.50847), (-18.85442, 2.5527, 1.78582), (-29.03982, 0.39624, 1.0),
+            (21.81606, 6.07314, 1.5168), (-68.33108, 2.286, 1.66446), (77.00772, 1.22174, 1.0),
+            (INF, 26.28138, 1.0), (-14.5161, 2.286, 1.50847), (-18.85442, 2.5527, 1.78582),
+            (-29.03982, 0.39624, 1.0),
             (-432.78552, 2.01422, 1.71736), (-70.3453, 62.98184, 1.0),
         ],
         "stop": 3, "pupil": 13.0, "angle": 10.0,
@@ -56,8 +57,9 @@ LENSES: dict[str, dict[str, Any]] = {
         "rows": [
             (203.47178, 6.35, 1.61272), (30.11424, 24.41702, 1.0), (42.53738, 9.08812, 1.71736),
             (-190.89878, 5.42544, 1.61272), (23.90394, 10.53084, 1.0), (-44.92752, 8.46582, 1.71736),
-            (-39.44874, 9.81202, 1.61272), (-56.59374, 24.99868, 1.0), (INF, 2.54, 1.0), (347.47962, 3.556, 1.61272),
-            (-87.06866, 1.5367, 1.0), (508.65278, 8.46328, 1.61272), (-23.51532, 11.10996, 1.71736),
+            (-39.44874, 9.81202, 1.61272), (-56.59374, 24.99868, 1.0), (INF, 2.54, 1.0),
+            (347.47962, 3.556, 1.61272), (-87.06866, 1.5367, 1.0), (508.65278, 8.46328, 1.61272),
+            (-23.51532, 11.10996, 1.71736),
             (-81.87182, 6.80466, 1.0), (263.77138, 3.556, 1.71736), (61.65088, 6.62686, 1.61272),
             (-98.62312, 0.381, 1.0), (85.471, 8.04418, 1.61272), (-374.76938, 39.63416, 1.0),
         ],
@@ -84,7 +86,7 @@ def rms(points: Any) -> float:
 
 
 def figures_of_optiland(lens: dict[str, Any]) -> dict[str, Any]:
-    """First order, rays of a field, the height of the chief ray that is aimed at the stop, and the spot on the axis."""
+    """First order, rays of a field, the height of the chief ray aimed at the stop, and the spot on the axis."""
     from optiland import materials, optic
 
     one = optic.Optic()
@@ -165,7 +167,7 @@ def slopes_at(height: float, exit_pupil: float, diameter: float, image: float, c
 def illumination_of_rayoptics(lens: dict[str, Any], height: float, exit_pupil: float, diameter: float) -> float:
     """The sum of cos⁴θ over rays of `slopes_at` that pass the stop, traced through the reversed lens."""
     rows = lens["rows"]
-    model, radius = _model_of_rayoptics(lens)
+    _, radius = _model_of_rayoptics(lens)
     image = sum(row[1] for row in rows)
     sequence = _empty_model_of_rayoptics(1.0)[0].seq_model
     gaps = [row[1:3] for row in rows[:-1]]

@@ -69,8 +69,8 @@ class PointRays:
     def through_stops(cls, camera: Train, distance: float, field: Pair) -> PointRays:
         """The rays that pass the camera's stops.
 
-        Stops behind plates, arrays and diffusers are ignored: they do not bound the rays at the entrance. Rays that
-        pass a real lens are found by tracing.
+        Stops behind plates, arrays and diffusers are ignored: they do not bound the rays at the entrance. Rays
+        that pass a real lens are found by tracing.
 
         Raises:
             InputError: no stop bounds the rays, or none passes.

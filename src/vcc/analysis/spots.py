@@ -119,7 +119,8 @@ def spots(
 ) -> Spots:
     """Spot diagrams: where rays of points meet the sensor, through all elements.
 
-    Real lenses refract them exactly. Rays are evenly spaced over the light that enters, and weighted by what the camera transmits. Geometric.
+    Geometric. Real lenses refract rays exactly. Rays are evenly spaced over the light that enters, and weighted by
+    what the camera transmits.
 
     Args:
         camera: a camera; or a lens, with its sensor where first-order optics images the distance.

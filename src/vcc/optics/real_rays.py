@@ -197,8 +197,8 @@ class Stop(Brief):
 
     Args:
         stages: that rays cross before it.
-        surfaces: of the real lens that the next stage is, up to the stop, the last of which is the stop; 0: the stop
-            is where that stage begins.
+        surfaces: of the real lens that the next stage is, up to and with the stop; 0: the stop is where that stage
+            begins.
         radius: metres; infinite if unknown.
     """
 
@@ -293,8 +293,8 @@ def entrance_box(train: Train, distance: float, field: Any) -> Box:
     """The part of the entrance plane through which the light of a point enters, a rectangle of (low, high).
 
     Openings before the first element that is not affine bound it exactly. Where a real lens follows, it is found
-    by tracing rays; masks count with their sizes. Where a lens has surfaces without clear diameters, rays far off may
-    reach its stop by absurd ways: only the region around the entrance pupil counts.
+    by tracing rays; masks count with their sizes. Where a lens has surfaces without clear diameters, rays
+    far off the axis may reach its stop too: only the region around the entrance pupil counts.
 
     Args:
         train: the camera.
@@ -481,8 +481,8 @@ def bundle(train: Train, distance: float, field: Any, side: int = SIDE) -> Bundl
     for stage in train.stages:
         if stage.faces.spread is not None:
             raise InputError(
-                f"{stage.element.label} scatters light, so that a point has no rays of its own: vcc.analysis.psf and "
-                "mtf include diffusers"
+                f"{stage.element.label} scatters light, so that a point has no rays of its own: "
+                "vcc.analysis.psf and mtf include diffusers"
             )
     low, high = entrance_box(train, distance, field)
     rays = rays_from(distance, field, midpoints(low, high, (side, side)))

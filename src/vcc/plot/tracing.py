@@ -152,7 +152,7 @@ class _Bundle:
         self.behind.append(np.zeros(len(positions)) if behind is None else behind)
 
     def refract(self, lens: RealLens) -> None:
-        """Refract the rays at each surface of a real lens, from its z to its end; those that miss one end there."""
+        """Refract the rays at each surface of a real lens, from its z to its end. Rays that miss one end."""
         middle, z = [*lens.decentre, 0.0, 0.0], lens.z
         x, y, s, t = (self.rays - middle).T
         for number, surface in enumerate(lens.onward):
