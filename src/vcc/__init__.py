@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from vcc.optics import Element as Element
     from vcc.optics import Faces as Faces
     from vcc.optics import FirstOrder as FirstOrder
-    from vcc.optics import RealLens as RealLens
     from vcc.optics import Lens as Lens
     from vcc.optics import LensArray as LensArray
     from vcc.optics import Louvre as Louvre
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
     from vcc.optics import Pyramid as Pyramid
+    from vcc.optics import RealLens as RealLens
     from vcc.optics import Term as Term
     from vcc.optics.electronics import Electronics as Electronics
     from vcc.optics.sensor import Sensor as Sensor

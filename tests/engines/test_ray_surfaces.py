@@ -1,4 +1,4 @@
-"""The compiled step through a real lens's surface against the NumPy one, and both derivatives against differences."""
+"""The compiled step through a lens's surface against the NumPy one, and both derivatives against differences."""
 
 from __future__ import annotations
 
@@ -43,14 +43,13 @@ def test_the_compiled_step_is_the_plain_one(name: str) -> None:
     ray_surfaces.through_surface(*packed(surface), before.shape[1], *found)
     np.testing.assert_allclose(found[4], share, atol=1e-12)
     np.testing.assert_allclose(found[:4], plain, atol=1e-13)
-    assert 0.3 < (share > 0).mean()
+    assert (share > 0).mean() > 0.3
 
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_derivatives_against_differences(name: str) -> None:
     surface, before = SURFACES[name], rays()
     weights = np.random.default_rng(4).standard_normal((5, before.shape[1]))
-    share = surface.refracted(*before)[4]
     inner = np.ones(before.shape[1], dtype=bool)
     if np.isfinite(surface.radius):  # rays next to an edge pass it in one of the differences
         met = surface.met(*before)

@@ -32,6 +32,7 @@ from vcc import (
     Prism,
     PrismArray,
     Pyramid,
+    RealLens,
     ResultWarning,
     Sensor,
     Spectrum,
@@ -44,6 +45,8 @@ from vcc.files.camera_reading import read_train
 from vcc.files.camera_writing import write_train
 from vcc.files.image_metadata import CameraMark
 from vcc.optics import glass as glasses
+from vcc.optics.prescription import Prescription
+from vcc.optics.prescription import Surface as LensSurface
 from vcc.optics.train import Train
 from vcc.shapes import by_channel, kernels, patterns, surfaces
 from vcc.shapes.directional import AngularFringes, Gaps, SoftRectangle
@@ -209,6 +212,28 @@ EVERYTHING = Camera(
         Pyramid(4, -0.02, z=17 * mm),
         PrismArray(RANDOM.random((2, 3, 2)), 1 * mm, "hexagonal", focal_length=50 * mm, z=18 * mm),
         FirstOrder([[0.9, 1 / 99], [-20, 79 / 99 / 0.9]], 5 * mm, np.eye(2), 9 * mm, z=20 * mm),
+        RealLens(
+            Prescription(
+                (
+                    LensSurface(30 * mm, 4 * mm, 1.5, 9 * mm, conic=-0.5, aspheres=(1e3, -2e7), number=1),
+                    LensSurface(-50 * mm, 1 * mm, 1.0, 9 * mm, material=None),
+                    LensSurface(np.inf, 1 * mm, 1.0, 5 * mm, True),
+                    LensSurface(40 * mm, 1 * mm, 1.6, 9 * mm, glass="F2", material=glasses.Abbe(1.62, 36.4)),
+                    LensSurface(60 * mm, 0.0, 1.0, 9 * mm),
+                ),
+                "a lens",
+                "lens.zmx",
+                image_distance=30 * mm,
+            ),
+            mask=patterns.Polygon(5, 4 * mm),
+            front=1 * mm,
+            transmission=(0.99, 0.98, 1, 0.97, 0.96),
+            z=31 * mm,
+            radiometry="paraxial",
+            softness=0.1 * mm,
+            dispersion=False,
+            fresnel=True,
+        ),
         FirstOrder(Affine.prism((0.1, 0)).matrix, entrance_diameter=3 * mm, exit_diameter=2 * mm, z=30 * mm),
         LensArray(125 * um, 1 / 3 * mm, z=49 * mm),
         LensArray(
@@ -263,8 +288,8 @@ def test_round_trip_is_exact(tmp_path):
         "everything_phase_plate_27_heights.npy",
         "everything_measured_path_paths.npy",
         "everything_prism_array_32_slopes.npy",
-        "everything_mask_48.npy",
-        "everything_mask_48_2.npy",
+        "everything_mask_49.npy",
+        "everything_mask_49_2.npy",
     }
 
 
@@ -295,6 +320,7 @@ def test_names_are_those_of_the_classes():
         "prism",
         "prism_array",
         "pyramid",
+        "real_lens",
     ]
     assert list(KERNEL_NAMES) == ["gaussian", "top_hat", "radial", "samples"]
     assert list(SURFACE_NAMES) == [
@@ -520,7 +546,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
             r'there is no file "circle" in .*; a pattern is written by name: \{ name = "circle"',
         ),
         (element("lense") + SENSOR, 'element 1: kind "lense" is not known: did you mean "lens"'),
-        (element("xyz") + SENSOR, 'kind "xyz" is not known; known are "angle_filter", .*"pyramid"$'),
+        (element("xyz") + SENSOR, 'kind "xyz" is not known; known are "angle_filter", .*"real_lens"$'),
         ("[[elements]]\nkind = 5\n" + SENSOR, "element 1: kind is 5: write it as text"),
         (LENS + element() + SENSOR, r'element 2 \(lens\) has no field "focal_length"'),
         (

@@ -13,7 +13,7 @@ import vcc.formats.lftoolbox
 from tests.fuzz import readers, seeds
 from tests.fuzz.readers import Read
 from tests.fuzz.seeds import Maker
-from tests.fuzz.texts import LENS, ZEMAX
+from tests.fuzz.texts import CODEV, LENS, OPTILAND, RAYOPTICS, ZEMAX
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,9 @@ FORMATS = {
     "camera moving": Format(seeds.moving_camera, "camera.toml", readers.moving_camera),
     "lens dat": Format(seeds.text("a.dat", LENS), "a.dat", readers.lens),
     "lens zmx": Format(seeds.text("a.zmx", ZEMAX), "a.zmx", readers.lens),
+    "lens seq": Format(seeds.text("a.seq", CODEV), "a.seq", readers.lens_2),
+    "lens json": Format(seeds.text("a.json", OPTILAND), "a.json", readers.lens),
+    "lens roa": Format(seeds.text("a.roa", RAYOPTICS), "a.roa", readers.lens),
     "truth pfm": Format(seeds.pfm, "", readers.truth),
     "truth npy": Format(seeds.inria_truth, "", readers.truth),
     "truth cambridge": Format(seeds.cambridge, "", readers.truth),

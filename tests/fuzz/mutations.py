@@ -17,7 +17,22 @@ from typing import Any
 
 from tests.fuzz.seeds import LYTRO_META, LYTRO_PRIVATE, lytro_bytes, lytro_parts
 
-TEXTS = {".toml", ".dat", ".zmx", ".csv", ".cfg", ".txt", ".xml", ".json", ".pbrt", ".obj", ".mtl", ".ply"}
+TEXTS = {
+    ".toml",
+    ".dat",
+    ".zmx",
+    ".seq",
+    ".roa",
+    ".csv",
+    ".cfg",
+    ".txt",
+    ".xml",
+    ".json",
+    ".pbrt",
+    ".obj",
+    ".mtl",
+    ".ply",
+}
 """Endings of files of text."""
 
 NUMBERS = ["0", "-1", "1", "nan", "inf", "-inf", "1e999", "-1e308", "1e-320", "2147483648", "-2147483649", "1e9"]
@@ -210,7 +225,7 @@ def of_file(name: str, data: bytes, rng: Random) -> bytes:
     knowing = rng.random() < 0.7
     ending = Path(name).suffix
     if ending in TEXTS:
-        return of_json(data, rng) if ending == ".json" and knowing else of_text(data, rng)
+        return of_json(data, rng) if ending in (".json", ".roa") and knowing else of_text(data, rng)
     for first, change in BY_FIRST_BYTES.items():
         if knowing and data.startswith(first):
             return change(data, rng)

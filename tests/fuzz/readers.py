@@ -15,6 +15,7 @@ from vcc.cli.info import describe
 from vcc.files.pictures import read_grey
 from vcc.formats import read_ground_truth, read_lytro
 from vcc.motion import load_moving_camera
+from vcc.prescriptions import read_prescription
 from vcc.sources.meshes import loaded
 from vcc.sources.mitsuba.renderer import _contents
 from vcc.sources.pbrt import PbrtScene
@@ -80,6 +81,12 @@ def lens(path: Path) -> Read:
     read = vcc.load_lens(path)
     figures = [read.focal_length, read.length, *np.ravel(read.matrix)]
     return _read(read, sane=not any(math.isnan(figure) for figure in figures))
+
+
+def lens_2(path: Path) -> Read:
+    """The second configuration of a lens."""
+    read = read_prescription(path, configuration=2).first_order()
+    return _read(read, sane=not math.isnan(read.focal_length))
 
 
 def mask(path: Path) -> Read:

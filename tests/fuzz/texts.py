@@ -1,5 +1,10 @@
 """Texts of seeds: camera files, lenses, scenes."""
 
+from __future__ import annotations
+
+import json
+from typing import Any
+
 HCI_CAMERA = """[intrinsics]
 focal_length_mm = 100
 image_resolution_x_px = 32
@@ -111,6 +116,90 @@ SURF 3
   CURV 0
   DISZ 0
 """
+CODEV = """RDM;LEN
+TITLE 'test'
+FNO 4
+DIM M
+WL 656.3 587.6 486.1
+REF 2
+YAN 0.0 10.0
+SO 0.0 1e10
+S 50.0 4 1.5168:64.17
+  STO
+  CIR 6.0
+  ASP; K -0.5; A 1e-6 ; B &
+  2e-9
+S -50.0 48 517642
+S -60.0 2
+SI 0.0 -0.1
+ZOO 2
+ZOO THI S2 48 49
+GO
+"""
+
+
+def _surface(shape: str, radius: float, z: float, medium: str, index: float) -> dict[str, Any]:
+    place = {"x": 0.0, "y": 0.0, "z": z, "rx": 0.0, "ry": 0.0, "rz": 0.0, "reference_cs": None}
+    return {
+        "geometry": {"type": shape, "cs": place, "radius": radius, "conic": -0.5, "coefficients": [0, 1e-6]},
+        "material_post": {"type": medium, "index": index, "abbe": 60},
+        "is_stop": z == 4.0,
+        "aperture": {"type": "RadialAperture", "r_max": 6, "r_min": 0},
+    }
+
+
+OPTILAND = json.dumps(
+    {
+        "version": 1.0,
+        "name": "test",
+        "aperture": {"type": "EPD", "value": 10},
+        "fields": {"fields": [{"x": 0.0, "y": 14}], "field_definition": {"field_type": "AngleField"}},
+        "wavelengths": {"wavelengths": [{"value": 0.55, "is_primary": True, "unit": "um"}]},
+        "surface_group": {
+            "surfaces": [
+                _surface("Plane", float("inf"), float("-inf"), "IdealMaterial", 1.0),
+                _surface("EvenAsphere", 50.0, 0.0, "AbbeMaterial", 1.5),
+                _surface("StandardGeometry", -50.0, 4.0, "IdealMaterial", 1.0),
+                _surface("Plane", float("inf"), 52.0, "IdealMaterial", 1.0),
+            ]
+        },
+    }
+)
+
+
+def _stored(kind: str, **attributes: Any) -> dict[str, Any]:
+    return {"__instance_type__": ["module", kind], "attributes": attributes}
+
+
+def _face(curvature: float) -> dict[str, Any]:
+    profile = _stored("EvenPolynomial", cv=curvature, cc=0.0, coefs=[0.0, 1e-6])
+    plain: dict[str, Any] = {"interact_mode": "transmit", "decenter": None, "clear_apertures": []}
+    return _stored("Surface", max_aperture=6.0, profile=profile, **plain)
+
+
+RAYOPTICS = json.dumps(
+    {
+        "optical_model": _stored(
+            "OpticalModel",
+            system_spec=_stored("SystemSpec", title="test", _dimensions="mm"),
+            optical_spec=_stored(
+                "OpticalSpecs",
+                pupil=_stored("PupilSpec", _key=["aperture", "image", "f/#"], value=4.0),
+                spectral_region=_stored("WvlSpec", wavelengths=[486.1, 587.6], reference_wvl=1),
+            ),
+            seq_model=_stored(
+                "SequentialModel",
+                stop_surface=1,
+                ifcs=[_face(curvature) for curvature in (0.0, 0.02, -0.02, 0.0)],
+                gaps=[
+                    _stored("Gap", thi=1e10, medium=_stored("Air")),
+                    _stored("Gap", thi=4.0, medium=_stored("ModelGlass", n=1.5, v=60.0, label="")),
+                    _stored("Gap", thi=48.0, medium=_stored("Air")),
+                ],
+            ),
+        )
+    }
+)
 
 
 PBRT_SCENE = """LookAt 0 0 5  0 0 0  0 1 0

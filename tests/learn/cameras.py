@@ -6,6 +6,7 @@ import numpy as np
 
 import vcc
 from vcc import kernels, patterns, surfaces
+from vcc.optics.prescription import Prescription, Surface
 from vcc.units import deg, mm, nm, um
 
 
@@ -57,6 +58,21 @@ ELEMENTS: dict[str, vcc.Element] = {
         0.5 * mm, 2 * mm, rotation=0.01, offset=(0.1 * mm, 0.0), fill_factor=0.7, width=6 * mm, name="array"
     ),
     "lens array of two": vcc.LensArray(0.5 * mm, (2 * mm, 3 * mm), "hexagonal", circular=True, name="array"),
+    "real lens": vcc.RealLens.of(
+        Prescription(
+            (
+                Surface(30 * mm, 1.2 * mm, 1.6, 9 * mm, conic=-0.5, aspheres=(1e-5 / mm**3,)),
+                Surface(-90 * mm, 0.5 * mm, 1.0),
+                Surface(np.inf, 0.5 * mm, 1.0, 2.4 * mm, True),
+                Surface(-80 * mm, 1 * mm, 1.5),
+                Surface(-90 * mm, 0.0, 1.0, 8 * mm),
+            )
+        ),
+        softness=0.8 * mm,
+        transmission=0.9,
+        fresnel=True,
+        name="objective",
+    ),
     "prism array": vcc.PrismArray(np.full((2, 3, 2), 0.001), 2 * mm, focal_length=50 * mm, name="array"),
     "first order": vcc.FirstOrder(
         ((0.9, 0.01), (-19.0, 0.9)), 5 * mm, np.eye(2), 8 * mm, entrance_diameter=9 * mm, name="relay"

@@ -35,12 +35,12 @@ BY_FOOTPRINTS = [
     "quadratic plate",
     "first order",
 ]
-BY_RAYS = ["gaussian diffuser", "cubic plate", "lens array of two"]
+BY_RAYS = ["gaussian diffuser", "cubic plate", "lens array of two", "real lens"]
 
 
 def camera_with(kind):
     element = ELEMENTS[kind]
-    lens = [] if element.name == "relay" else [LENS]
+    lens = [] if element.name in ("relay", "objective") else [LENS]
     at_lens = kind == "cubic plate"
     z = 58 * mm if isinstance(element, vcc.LensArray) else 2.1 * mm if at_lens else 10.3 * mm
     return vcc.Camera([*lens, replace(element, z=z, decentre=(0.05 * mm, -0.08 * mm))], SENSOR)

@@ -382,7 +382,7 @@ class Sheet:
         bend: (Δs, Δt) as functions of position, or None, with bounds of both.
         openings: all openings that light must pass.
         scatter: (δs, δt) as functions of three uniform numbers and positions, or None, with bounds of both.
-        traced: rays just behind to rays just before, and the share that passes; ``affine`` is then its first order.
+        traced: rays just behind to rays just before, and the share that passes; ``affine`` is its first order.
     """
 
     step: Array

@@ -1,7 +1,7 @@
 """Third-order aberrations of real lenses against sums of Seidel, and the symplectic condition.
 
-Sums: Welford, Aberrations of Optical Systems, chapter 8 (S₁ to S₅ by paraxial rays, and what aspheres add). Aberrations
-of the exact trace are taken at small apertures and fields, where their third order is left.
+Sums: Welford, Aberrations of Optical Systems, chapter 8 (S₁ to S₅ by paraxial rays, and what aspheres add).
+Aberrations of the exact trace are taken at small apertures and fields, where their third order is left.
 """
 
 from __future__ import annotations

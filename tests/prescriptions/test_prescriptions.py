@@ -384,8 +384,8 @@ def test_remarks_behind_a_surface_and_air_as_zero(file):
 
 
 def test_other_files(file, tmp_path):
-    with pytest.raises(InputError, match=r"known are \.dat \(PBRT\) and \.zmx \(Zemax\)"):
-        vcc.load_lens(file("lens.seq", ""))
+    with pytest.raises(InputError, match=r"known are \.dat \(PBRT\), .*\.zmx \(Zemax\), and the names"):
+        vcc.load_lens(file("lens.len", ""))
     with pytest.raises(InputError, match=r"there is no lens prescription .*missing\.dat"):
         vcc.load_lens(tmp_path / "missing.dat")
     (tmp_path / "folder.zmx").mkdir()

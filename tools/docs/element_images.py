@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 import vcc
 from vcc.files.pictures import auto_exposure
 from vcc.files.transfer import encode
+from vcc.optics.prescription import Prescription, Surface
 from vcc.plot import plot_element, style
 from vcc.plot.tracing import trace
-from vcc.optics.prescription import Prescription, Surface
 from vcc.showcase.scene import FAR, MIDDLE, NEAR, Chart, Foliage, demo_scene
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Painting

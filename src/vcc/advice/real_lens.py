@@ -79,12 +79,12 @@ def _of_field(trains: Sequence[Train], distance: float, share: float, name: str)
     if share == 0:
         return lines
     middle = np.array(reference.sensor.decentre)
-    here = irradiance(reference, middle + [share * half_diagonal(reference), 0.0])
+    here = irradiance(reference, middle + np.array([share * half_diagonal(reference), 0.0]))
     there = irradiance(reference, middle)
     if there[0] > 0:
         hidden = max(0.0, 1 - here[1] / there[1])
         lines.append(
-            f"{name}, rims hide {hidden:.0%} of the stop; irradiance is {here[0] / there[0]:.0%} of that in the middle"
+            f"{name}, rims hide {hidden:.0%} of the stop; irradiance is {here[0] / there[0]:.0%} of the middle's"
         )
     bend = _distortion(reference, distance, fields)
     return [*lines, f"{name}, distortion is {round(bend, 4) + 0.0:+.2%}"]

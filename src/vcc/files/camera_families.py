@@ -22,10 +22,10 @@ from vcc import optics
 from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.optics import Element, FirstOrder, glass
+from vcc.optics import Element, FirstOrder, RealLens, glass
 from vcc.optics.glass import Glass
-from vcc.prescriptions import load_lens
 from vcc.optics.prescription import Reference
+from vcc.prescriptions import load_lens
 from vcc.shapes import by_channel, directional, height_maps, kernels, lattice, patterns, surfaces, zernike
 from vcc.shapes.kernels import Kernel
 from vcc.shapes.patterns import Pattern
@@ -154,7 +154,7 @@ class _LensFile:
             for field in dataclasses.fields(self)[1:]
             if getattr(self, field.name) is not None
         }
-        lens = load_lens(folder / expanded(self.lens_file), **given)
+        lens: FirstOrder = load_lens(folder / expanded(self.lens_file), **given)
         return dataclasses.replace(lens, source=self.lens_file)
 
     @classmethod
@@ -173,7 +173,37 @@ class _LensFile:
         return None
 
 
-FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile}
+@dataclasses.dataclass(frozen=True)
+class _RealLensFile:
+    """`vcc.load_lens` with ``model="real"`` in a camera file; it is saved with its surfaces."""
+
+    lens_file: str
+    stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    f_number: float | None = None
+    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    glasses: dict[str, float] | None = None
+    configuration: int | None = None
+    z_of: str = "first surface"
+    mask: Pattern | None = None
+    radiometry: str = "exact"
+    transmission: float | tuple[float, ...] = 1.0
+    fresnel: bool = False
+    softness: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
+    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
+    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
+    name: str = ""
+
+    def made(self, folder: Path) -> RealLens:
+        fields = dataclasses.fields(self)[1:]
+        given = {field.name: value for field in fields if (value := getattr(self, field.name)) is not None}
+        return load_lens(folder / expanded(self.lens_file), model="real", **given)
+
+    @classmethod
+    def of(cls, lens: RealLens, folder: Path) -> None:
+        return None
+
+
+FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile, RealLens: _RealLensFile}
 """Elements that a separate lens file can describe: the form to read if its first field is given."""
 
 

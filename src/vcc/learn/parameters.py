@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.optics import prescription
 from vcc.optics.diffuser import CodedDiffuser
 from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
@@ -191,6 +192,10 @@ def why_none(found: Parameter) -> str | None:
     value = found.value
     if value is None:
         return "left out (None)"
+    if isinstance(value, tuple) and not value:
+        return "empty"
+    if isinstance(found.holder, prescription.Surface) and found.field == "index" and value == 1:
+        return "the index of air"
     if isinstance(value, str):
         return f"a word, {value!r}"
     if isinstance(value, bool | np.bool_):

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from vcc.base.affine import Affine
 from vcc.base.cached import cached
@@ -96,6 +95,8 @@ class Aberrations(Value):
             basis: (4, 4).
             loose: (4, any number).
         """
+        from scipy.stats import qmc  # slow to import
+
         columns = np.concatenate([basis, loose], axis=1)
         drawn = qmc.Sobol(columns.shape[1], seed=0).random_base2(RAYS) * 2 - 1
         inner = 1 << (RAYS - 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,10 @@ from vcc.shapes.patterns import Circle, Pattern
 
 Array = NDArray[np.float64]
 
-Radiometry = Literal["exact", "paraxial"]
+RADIOMETRIES = ("exact", "paraxial")
 """How the irradiance behind a lens counts: by angles (cos⁴θ), or by slopes."""
-PUPIL_MARGIN = 1.005
-"""Factor on the radius of the exit pupil that traced rays fill."""
+PUPIL_STEP = 0.01
+"""Radii of exit windows are rounded up to powers of 1 plus this, and stay while a lens changes a little."""
 FARTHEST = 100.0
 """An exit pupil farther away than this many lengths of the lens is replaced by the plane behind the lens."""
 
@@ -48,12 +48,13 @@ class RealLens(Element):
             in air.
         front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
         dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
-        radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as behind
-            thin lenses, without the fall-off cos⁴θ.
-        transmission: share of light that each surface transmits; ``"fresnel"``: that of surfaces without
-            coatings, from indices and angles; a number for all, or one for each surface.
-        softness: width over which the edges of stop and rims fall off, metres; 0 is hard. Gradients with respect to
-            what moves an edge against rays need soft edges.
+        radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as
+            behind thin lenses, without the fall-off cos⁴θ.
+        transmission: share of light that each surface transmits: a number for all, or one for each surface.
+        fresnel: whether surfaces are without coatings: each then transmits what Fresnel's formulas state for
+            unpolarised light, from indices and angle.
+        softness: width over which the edges of stop and rims fall off, metres; 0 is hard. Gradients with
+            respect to what moves an edge against rays need soft edges.
         source: where the lens comes from, as text.
 
     Raises:
@@ -66,8 +67,9 @@ class RealLens(Element):
     mask: Pattern | None = None
     front: float = field(default=0.0, metadata={"unit": "length"})
     dispersion: bool = True
-    radiometry: Radiometry = "exact"
-    transmission: float | tuple[float, ...] | Literal["fresnel"] = 1.0
+    radiometry: str = "exact"
+    transmission: float | tuple[float, ...] = 1.0
+    fresnel: bool = False
     softness: float = field(default=0.0, metadata={"unit": "length"})
     source: str = field(default="", compare=False)
 
@@ -80,13 +82,13 @@ class RealLens(Element):
             )
         checks.sizes(self.label, stop_diameter=self.stop_diameter, way_out="leave it out for that of the file")
         checks.finite(f"front of {self.label}", self.front, "metres")
-        checks.one_of(f"radiometry of {self.label}", self.radiometry, get_args(Radiometry))
+        checks.one_of(f"radiometry of {self.label}", self.radiometry, RADIOMETRIES)
         checks.zero_or_more(f"softness of {self.label}", self.softness, unit="m")
         self._check_transmission()
         if self.mask is not None and self._split is None:
             raise InputError(
-                f"{self.label} has no plane for a mask: the stop of {self.prescription.source or 'its prescription'} "
-                "must be a flat surface in air"
+                f"{self.label} has no plane for a mask: the stop of "
+                f"{self.prescription.source or 'its prescription'} must be a flat surface in air, between others"
             )
         if self.stop_number is None:
             raise InputError(
@@ -96,19 +98,17 @@ class RealLens(Element):
 
     def _check_transmission(self) -> None:
         given = self.transmission
-        if isinstance(given, str):
-            checks.one_of(f"transmission of {self.label}", given, ("fresnel",))
-            return
         count = len(self.prescription.surfaces)
-        shares = given if isinstance(given, Sequence) else (given,) * count
+        shares = tuple(given) if isinstance(given, Sequence) else (given,) * count
         if len(shares) != count:
             raise InputError(
-                f"transmission of {self.label} has {len(shares)} shares, and the lens has {count} surfaces: give one "
-                'for each, one number for all, or "fresnel"'
+                f"transmission of {self.label} has {len(shares)} shares, and the lens has {count} surfaces: give "
+                "one for each, or one number for all"
             )
         for share in shares:
-            if not (isinstance(share, int | float) and 0 < share <= 1):
-                raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share!r}")
+            checks.above_zero(f"transmission of {self.label}", share)
+            if share > 1:
+                raise InputError(f"transmission of {self.label} is a share above 0 and up to 1, not {share:g}")
 
     @classmethod
     def of(
@@ -221,7 +221,7 @@ class RealLens(Element):
             if surface.stop and self.mask is not None:
                 diameter = None
             given = self.transmission
-            share = 1.0 if isinstance(given, str) else given[n] if isinstance(given, Sequence) else given
+            share = given[n] if isinstance(given, Sequence) else given
             found.append(
                 Refraction(
                     distance=self.front if n == 0 else surfaces[n - 1].thickness,
@@ -232,7 +232,7 @@ class RealLens(Element):
                     radius=math.inf if diameter is None else diameter / 2,
                     softness=self.softness if diameter is not None else 0.0,
                     transmission=1.0 if _is_empty(surface, before) else float(share),
-                    fresnel=given == "fresnel" and not _is_empty(surface, before),
+                    fresnel=self.fresnel and not _is_empty(surface, before),
                 )
             )
             before = surface.index
@@ -246,14 +246,14 @@ class RealLens(Element):
         onward, split = self.onward, self._split if self.mask is not None else None
         distance, radius = self.exit_window
         last = Affine.propagation(distance)
-        window = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
+        window: list[Part] = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
         weighted = self.radiometry == "exact"
         if split is None:
             whole = _between(onward, self._behind, weighted)
             return (Faces(deflection=whole), whole.first_order, *window)
         front = _between(onward[:split], onward[split].distance, False)
         rear = _between(onward[split + 1 :], self._behind, weighted)
-        middle = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
+        middle: list[Part] = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
         return (*middle, Faces(deflection=rear), rear.first_order, *window)
 
     def faces(self) -> Faces:
@@ -275,7 +275,8 @@ class RealLens(Element):
         # The image of the stop: where rays from its middle meet the axis again.
         far = abs(exit_from_slope) >= FARTHEST * length * abs(slope_from_slope)
         distance = 0.0 if far else float(-exit_from_slope / slope_from_slope)
-        return distance, PUPIL_MARGIN * self._widest(distance)
+        steps = math.ceil(math.log(self._widest(distance)) / math.log1p(PUPIL_STEP) + 0.5)
+        return distance, (1 + PUPIL_STEP) ** steps
 
     def _widest(self, distance: float) -> float:
         """The largest distance from the axis at which light meets a plane behind the lens."""

@@ -102,6 +102,7 @@ def load_lens(
     wavelength: float | None = None,
     glasses: Mapping[str, float | Glass] | None = None,
     rims: bool | None = None,
+    configuration: int | None = None,
     decentre: tuple[float, float] = (0.0, 0.0),
     name: str = "",
     **real: Any,
@@ -131,9 +132,11 @@ def load_lens(
         glasses: refractive indices, or glasses of `vcc.glasses`, by name, which override catalogues:
             ``{"N-BK7": 1.5168}``.
         rims: of a first-order lens, whether the rims of the first and the last surface limit the light too.
+        configuration: as in `read_prescription`.
         decentre: position (x, y) of the lens's axis, metres.
         name: name in messages and plots.
-        real: of a real lens: ``mask``, ``radiometry``, ``transmission`` and ``softness`` of `vcc.RealLens`.
+        real: of a real lens: ``mask``, ``radiometry``, ``transmission``, ``fresnel`` and ``softness`` of
+            `vcc.RealLens`.
 
     Warns:
         ResultWarning: the stop is opened wider than in the file.
@@ -142,7 +145,8 @@ def load_lens(
         InputError: as in `read_prescription`, `Prescription.first_order` and `vcc.RealLens`.
     """
     checks.one_of("model", model, ("first order", "real"))
-    prescription = read_prescription(path, wavelength=wavelength or D_LINE, glasses=glasses)
+    given = D_LINE if wavelength is None else wavelength
+    prescription = read_prescription(path, wavelength=given, glasses=glasses, configuration=configuration)
     placed: dict[str, Any] = {"z": z, "z_of": z_of, "stop_diameter": stop_diameter, "f_number": f_number}
     placed |= {"decentre": decentre, "name": name}
     with reading(path, "a lens"):

@@ -60,8 +60,12 @@ def radius_of(curvature: float, unit: float) -> float:
 
 def to_axis(angles: Sequence[tuple[float, float]]) -> tuple[float, ...]:
     """The angles between rays and the axis, degrees, of their angles in x and in y."""
-    tangents = [math.hypot(*(math.tan(math.radians(angle)) for angle in pair)) for pair in angles]
-    return tuple(math.degrees(math.atan(tangent)) for tangent in tangents)
+    return tuple(
+        math.degrees(math.atan(math.hypot(*(math.tan(math.radians(angle)) for angle in pair))))
+        if all(0 < abs(angle) < 90 for angle in pair)
+        else max(map(abs, pair))  # in one of the two planes; fisheyes have more than 90 degrees
+        for pair in angles
+    )
 
 
 def not_supported(place: str, what: str) -> InputError:

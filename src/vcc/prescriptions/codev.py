@@ -20,6 +20,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import cm, mm, nm
 from vcc.optics.catalogues import spelled
 from vcc.optics.glass import Glass, Table
+from vcc.optics.prescription import Prescription, Surface
 from vcc.prescriptions.assembly import (
     FAR,
     assembled,
@@ -31,7 +32,6 @@ from vcc.prescriptions.assembly import (
     without_r2,
 )
 from vcc.prescriptions.media import AIR, Media, Medium
-from vcc.optics.prescription import Prescription, Surface
 
 _UNITS = {"M": mm, "MM": mm, "C": cm, "CM": cm, "I": 25.4 * mm, "IN": 25.4 * mm}
 _TERMS = "ABCDEFGHJ"
@@ -51,6 +51,7 @@ _ZERO = {
 }
 """Commands that are supported only with values of 0."""
 _NOT_ROUND = {"REX": "a rectangular", "REY": "a rectangular", "ELX": "an elliptical", "ELY": "an elliptical"}
+_OF_SURFACES = {"STO", "GLA", *_NUMBERS, *_REFUSED, *_ZERO, *_NOT_ROUND}
 _WITHOUT_EFFECT = re.compile(r"THC|CCY|KC|[A-J]C|GLC|V[UL][XY]|WT[FWZ]|TIT|[XY](AN|IM|RI|OB)|POS|SLB|DLT|PIM")
 """What does not change the lens between zoom positions: codes of optimisation, vignetting, fields, titles."""
 _FICTITIOUS = re.compile(r"(\d{3,6})\.(\d{3,6})|(\d{3})(\d{3})|(\d\.\d+):(\d+\.?\d*)")
@@ -93,7 +94,7 @@ class _Reader:
         name, values = words[0].upper(), words[1:]
         if self.in_private:
             self._private_glass(name[:3], words)
-        elif re.fullmatch(r"S(O|I|\d{1,6})?", name) and values and real(values[0]) is not None:
+        elif re.fullmatch(r"S(O|I|\d{1,6})?", name):
             self._new_surface(name[1:], values)
         elif name.startswith("ZOO"):
             self.zooms.append((self.place, values))
@@ -121,6 +122,8 @@ class _Reader:
             self.private[_bare(words[0])] = indices[0] if len(pairs) == 1 else Table(waves, indices)
 
     def _new_surface(self, which: str, values: list[str]) -> None:
+        if not values:
+            raise InputError(f"{self.place}: a surface has a radius, a thickness and a glass")
         expected = "O" if not self.rows else str(len(self.rows))
         if (which or expected) not in (expected, "I") and not (which == "0" and not self.rows):
             raise InputError(f"{self.place}: surface S{expected} should follow, not S{which}")
@@ -161,7 +164,7 @@ class _Reader:
         row = self.rows[-1] if self.rows else None
         if values and (named := re.fullmatch(r"S([OIS]|\d{1,6})", values[0].upper())):
             row, values = self._row(named[1]), values[1:]
-        if row is None:
+        if row is None or name not in _OF_SURFACES:
             return False
         if name in _REFUSED and not (name == "RMD" and [v.upper()[:4] for v in values[:1]] == ["REFR"]):
             raise not_supported(self.surface(row), f"{_REFUSED[name]} ({name})")
@@ -205,7 +208,9 @@ class _Reader:
             if values and (position := re.fullmatch(r"Z(\d{1,6})", values[0].upper())):
                 values = [values[1]] if position[1] == str(configuration) and len(values) > 1 else []
             elif values:
-                values = [values[min(configuration, len(values)) - 1]] if len(values) in (1, many) else ["?"]
+                if len(values) not in (1, many):
+                    raise InputError(f"{place}: {name} has {len(values)} values for {many} zoom positions")
+                values = [values[min(configuration, len(values)) - 1]]
             if values and not self._of_surface(name, [target, *values] if target else values):
                 self.system[name] = values
             if values and target and name == "THI":

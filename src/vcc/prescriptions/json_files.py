@@ -1,7 +1,7 @@
 """Lenses of other Python packages: Optiland's JSON (.json) and RayOptics' JSON (.roa).
 
-Both store the attributes of their objects. Lenses of spheres, conics and even aspheres are read as Optiland 0.6 and
-RayOptics 0.9 write them. Lengths are millimetres in Optiland, and in the unit that the file states in RayOptics.
+Both store the attributes of their objects. Lenses of spheres, conics and even aspheres are read as Optiland 0.6
+and RayOptics 0.9 write them. Lengths are millimetres in Optiland, and in RayOptics the unit that the file states.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from vcc.base.reading import read_json, value_at
 from vcc.base.units import cm, m, mm, nm, um
 from vcc.optics.catalogues import makers
 from vcc.optics.glass import Table
+from vcc.optics.prescription import Prescription, Surface
 from vcc.prescriptions.assembly import (
     FAR,
     assembled,
@@ -28,7 +29,6 @@ from vcc.prescriptions.assembly import (
     without_r2,
 )
 from vcc.prescriptions.media import AIR, Media, Medium
-from vcc.optics.prescription import Prescription, Surface
 
 _UNITS = {"mm": mm, "cm": cm, "m": m, "inches": 25.4 * mm, "um": um, "nm": nm, "feet": 304.8 * mm}
 

@@ -12,9 +12,9 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.units import mm
+from vcc.optics.prescription import Prescription, Surface
 from vcc.prescriptions.assembly import no_configuration
 from vcc.prescriptions.media import Media
-from vcc.optics.prescription import Prescription, Surface
 
 _COLUMNS = ("radius", "thickness", "index", "diameter")
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import cm, m, mm, um
+from vcc.optics.prescription import Prescription, Surface
 from vcc.prescriptions.assembly import (
     MOST_TERMS,
     assembled,
@@ -32,7 +33,6 @@ from vcc.prescriptions.assembly import (
     without_r2,
 )
 from vcc.prescriptions.media import AIR, Media, Medium
-from vcc.optics.prescription import Prescription, Surface
 
 _UNITS = {
     "MM": mm,
@@ -298,8 +298,8 @@ def _aspheres(surface: _Lines, unit: float, place: str) -> tuple[float, ...]:
     if kind == ["XASPHERE"]:
         terms = surface.numbered.get("XDAT", {})
         count, norm = int(min(terms.get(1, 0), MOST_TERMS)), terms.get(2, 1.0)
-        if count > 0 and norm <= 0:
-            raise InputError(f"{place} has the norm radius {norm:g} (XDAT 2): it is greater than 0")
+        if count > 0 and norm < 1e-6:
+            raise InputError(f"{place} has the norm radius {norm:g} (XDAT 2): it is 1e-6 or more")
         return without_r2([terms.get(i + 2, 0.0) / norm ** (2 * i) for i in range(1, count + 1)], unit, place)
     return ()
 

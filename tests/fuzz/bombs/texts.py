@@ -12,7 +12,7 @@ from tests.fuzz import readers, seeds
 from tests.fuzz.bombs.bomb import Bomb, changed, npy, written, zeros_deflated
 from tests.fuzz.bombs.lists import LAUGHS
 from tests.fuzz.seeds import LYTRO_META, Maker
-from tests.fuzz.texts import LENS, PBRT_SCENE, ZEMAX
+from tests.fuzz.texts import CODEV, LENS, OPTILAND, PBRT_SCENE, RAYOPTICS, ZEMAX
 
 CELLS = "[[0, 1], [1, 0.5]]"
 SHAPE = "shape = [50, 50]"
@@ -97,6 +97,22 @@ BOMBS = {
     "lens dat tiny radius": _lens("a.dat", "1e-320 1 1.5 10\n-1e-320 1 1 10\n"),
     "lens dat huge": _lens("a.dat", "1e308 1e308 1e308 1e308\n-1e308 1 1 1e308\n", refused=False),
     "lens zmx huge curve": _lens("a.zmx", ZEMAX.replace("CURV 0.02", "CURV 1e308")),
+    "lens zmx parameter 10^9": _lens("a.zmx", ZEMAX.replace("STOP", "STOP\n TYPE EVENASPH\n PARM 1000000000 1")),
+    "lens zmx 10^9 terms": _lens(
+        "a.zmx",
+        ZEMAX.replace("STOP", "STOP\n TYPE XASPHERE\n XDAT 1 1e9\n XDAT 2 1e-300\n XDAT 99 1"),
+        refused=True,
+    ),
+    "lens zmx 1e999 configurations": _lens("a.zmx", ZEMAX + "MNUM 1e999 1e999\n", refused=False),
+    "lens zmx 1e999 fields": _lens("a.zmx", ZEMAX.replace("ENPD", "FTYP 0 0 1e999 1e999\nENPD"), refused=False),
+    "lens seq surface 10^9": _lens("a.seq", CODEV.replace("S -60.0", "S999999999 -60.0")),
+    "lens seq 1e999 positions": _lens("a.seq", CODEV.replace("ZOO 2", "ZOO 1e999"), refused=False),
+    "lens seq reference 1e999": _lens("a.seq", CODEV.replace("REF 2", "REF 1e999"), refused=False),
+    "lens seq 10^6 continued": _lens("a.seq", "RDM &\n" * 10**5),
+    "lens seq quotes": _lens("a.seq", CODEV.replace("'test'", "'" * 10**5), refused=False),
+    "lens json deep": _lens("a.json", "[" * 200000),
+    "lens json 10^400": _lens("a.json", OPTILAND.replace("-50.0", "1" + "0" * 400)),
+    "lens roa 10^6 terms": _lens("a.roa", RAYOPTICS.replace("[0.0, 1e-06]", "[" + "0," * 10**6 + "1]")),
     "lens zmx stop as list": _lens("a.zmx", ZEMAX.replace("ENPD 10", "ENPD"), refused=False),
     "lytro 1e9 pixels": _lytro(lambda meta: meta["image"].update(width=10**9, height=10**9)),
     "lytro deep json": Bomb(written("a.lfr", seeds.lytro_bytes(b"[" * 200000, [])), "a.lfr", readers.lytro),

@@ -70,7 +70,7 @@ def _back(
     own = {"transmission": carried / surface.transmission}
     own |= {"radius": np.zeros_like(carried), "softness": np.zeros_like(carried)}
     if surface.softness > 0:
-        away = np.sqrt(square)
+        away = np.maximum(np.sqrt(square), 1e-300)
         inside = (surface.radius - away) / surface.softness + 0.5
         of_inside = np.where(inside < 1, carried / inside / surface.softness, 0.0)
         own["radius"] = of_inside
