@@ -104,8 +104,7 @@ def _limit(bundles: Sequence[Bundle], rms: float, pitch: float, share: float) ->
     """What makes a spot as large as it is."""
     if 2 * rms < FINE * pitch:
         return "aberrations do not show"
-    alone = math.sqrt(float(np.mean([one.rms() ** 2 for one in bundles])))
-    if rms > 1.4 * alone:
+    if rms > 1.4 * bundles[len(bundles) // 2].rms():
         return "limited by colour"
     shift = sharpest_shift(bundles, "spot")
     if share == 0 and _together(bundles, shift) < rms / 2:

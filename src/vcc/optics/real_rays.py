@@ -61,7 +61,7 @@ class Bundle(Brief):
     @property
     def centroid(self) -> Array:
         """Of the light, (x, y), metres."""
-        return self.light @ self.places / self.light.sum()
+        return np.asarray(self.light @ self.places / self.light.sum())
 
     def rms(self, shift: float = 0.0) -> float:
         """Root mean square distance from the centroid, metres, on a sensor ``shift`` metres farther behind."""
@@ -243,7 +243,8 @@ class Stop(Brief):
         assert isinstance(stage.faces.bending, Aberrations)
         *before, surface = stage.faces.bending.without_rims.onward[: self.surfaces]
         found, share = traced(tuple(before), rays)
-        met = surface.met(*np.moveaxis(found, -1, 0))
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+            met = surface.met(*np.moveaxis(found, -1, 0))
         return np.where(share[..., None] > 0, np.stack([met.x, met.y], axis=-1), np.nan)
 
 
@@ -617,7 +618,7 @@ def irradiance(train: Train, place: Any, side: int = 129) -> tuple[float, float]
     slopes = midpoints(*box, (side, side))
     _, share = from_sensor(train, rays(slopes))
     stop = Stop.of(train).places(train, from_sensor(train, rays(slopes), rims=False)[0]).reshape(side, side, 2)
-    by_t, by_s = np.gradient(stop, axis=(0, 1))
+    by_t, by_s = (np.asarray(np.gradient(stop, axis=axis)) for axis in (0, 1))
     covered = np.abs(by_s[..., 0] * by_t[..., 1] - by_s[..., 1] * by_t[..., 0]).ravel()
     area = float(np.nansum(np.where(share > 0, covered, 0.0)))
     return float(share.sum() * np.prod(box[1] - box[0])) / side**2, area

@@ -164,20 +164,16 @@ def _draw_real_lens(pen: Pen, lens: RealLens, beam: float) -> None:
         if index == 1:
             continue
         edge = max(low[-1], high[-1])  # the smaller of both sides is flat beyond its clear diameter
-        outline = [(front, low), ([front[-1], back[-1]], [edge, edge]), (back[::-1], high[::-1])]
-        outline.append(([back[0], front[0]], [-edge, -edge]))
+        depths = np.concatenate([front, [front[-1], back[-1]], back[::-1], [back[0], front[0]]])
+        heights = np.concatenate([low, [edge, edge], high[::-1], [-edge, -edge]])
         bounded = all(math.isfinite(each.radius) for each in lens.onward[number : number + 2])
-        pen.glass(
-            *(np.concatenate([part[n] for part in outline]) + (n and centre) for n in (0, 1)), bounded=bounded
-        )
-    number = lens.stop_number
-    if number is None:
-        return
-    stop, (sag, height) = lens.onward[number], arcs[number]
-    half = lens.mask.size[pen.axis] / 2 if lens.mask is not None else stop.radius
+        pen.glass(depths, heights + centre, bounded)
+    place = lens.stop_number
+    assert place is not None
+    half = lens.mask.size[pen.axis] / 2 if lens.mask is not None else lens.onward[place].radius
     if math.isfinite(half):
-        beside = [part[1][-1] for part in arcs[max(number - 1, 0) : number + 2]]
-        _draw_stop(pen, float(sag[-1]), centre, half, max(1.4 * half, *beside))
+        beside = [heights[-1] for _, heights in arcs[max(place - 1, 0) : place + 2]]
+        _draw_stop(pen, float(arcs[place][0][-1]), centre, half, max(1.4 * half, *beside))
 
 
 def _widest_sag(surface: Refraction) -> float:

@@ -157,7 +157,8 @@ class _Bundle:
         x, y, s, t = (self.rays - middle).T
         for number, surface in enumerate(lens.onward):
             z += surface.distance
-            met = surface.met(x, y, s, t)
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                met = surface.met(x, y, s, t)
             hit = np.isfinite(met.x) & np.isfinite(met.z)
             plane = x + surface.distance * s, y + surface.distance * t
             places = np.column_stack(
