@@ -25,7 +25,7 @@ NAMES = {
     "vcc.operators": "masked projected resampled scattered",
     "vcc.patterns": "Bounded Cells Circle CosineSum Polygon mura",
     "vcc.plot": "phase_space_stages plot_camera plot_phase_space_stages",
-    "vcc.prescriptions": "Prescription load_lens read_prescription",
+    "vcc.prescriptions": "Prescription Surface built_in_lenses load_lens qcon read_prescription",
     "vcc.recording": "Recording expose_image photon_transfer PhotonTransfer",
     "vcc.recover": "blurred decode_plenoptic focal_stack novel_view refocused wiener without_aberration",
     "vcc.recover.defocus_depth": "defocus_kernels depth_from_defocus",
