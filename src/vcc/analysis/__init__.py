@@ -26,6 +26,7 @@ from vcc.analysis.lens_sharpness import (
     mtf_over_field,
     psf_over_field,
 )
+from vcc.analysis.lens_spots import RayFans, Spots, ray_fans, spots
 from vcc.analysis.pictures import plot_plane_spectrum, plot_spectrum
 from vcc.analysis.plane_spectrum import (
     PlaneSpectrum,
@@ -38,7 +39,6 @@ from vcc.analysis.point_spread import PointSpread, mtf, otf, psf
 from vcc.analysis.refocus import Refocuser
 from vcc.analysis.sampling import SamplingAdvice, sampling_advice
 from vcc.analysis.spectrum import Spectrum, fft4, ifft4, samples_of
-from vcc.analysis.spots import RayFans, Spots, ray_fans, spots
 
 __all__ = [
     "AxialColour",
