@@ -240,7 +240,7 @@ class RealLens(Element):
 
     def parts(self) -> tuple[Part, ...]:
         """The surfaces' deviation from first order, then the first order; twice, around a mask at the stop."""
-
+        onward, split = self.onward, self._split if self.mask is not None else None
         weighted = self.radiometry == "exact"
         if split is None:
             whole = _between(onward, self._behind, weighted)
@@ -260,10 +260,8 @@ class RealLens(Element):
         """
         distance = self._pupil_distance
         widest = None if seen is None else self._widest_seen(distance, seen)
-        if widest is None:
-            widest = self._widest(distance)
-        steps = math.ceil(math.log(widest) / math.log1p(PUPIL_STEP) + 0.5)
-        disc = Faces(transmission=Circle(2 * (1 + PUPIL_STEP) ** steps))
+        radius = self.exit_window[1] if widest is None else _rounded_up(widest)
+        disc = Faces(transmission=Circle(2 * radius))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
 
@@ -273,8 +271,15 @@ class RealLens(Element):
 
     @property
     @cached
+    def exit_window(self) -> tuple[float, float]:
+        """(distance, radius) of a disc that all light leaving the lens passes, metres; from the end of the element."""
+        return self._pupil_distance, _rounded_up(self._widest(self._pupil_distance))
+
+    @property
+    @cached
     def _pupil_distance(self) -> float:
-        """(distance, radius) of a disc that all light leaving the lens passes, metres.
+        """From the end of the element to the first-order exit pupil, metres; 0 if that is far away."""
+        number, length = self.stop_number, max(self.prescription.length, 1e-3)
         assert number is not None
         behind = Affine.propagation(self._behind) @ _first_order(self.onward[number + 1 :])
         exit_from_slope, slope_from_slope = behind.linear[0, 2], behind.linear[2, 2]
@@ -421,6 +426,11 @@ def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float
         near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
         points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
     return float(away.max())
+
+
+def _rounded_up(radius: float) -> float:
+    """The next power of 1 + PUPIL_STEP, half a step or more above a radius, metres."""
+    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 0.5))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:
