@@ -272,7 +272,7 @@ class RealLens(Element):
     @property
     @cached
     def exit_window(self) -> tuple[float, float]:
-        """(distance, radius) of a disc that all light leaving the lens passes, metres; from the end of the element."""
+        """(distance from the end of the element, radius) of a disc that all light leaving passes, metres."""
         return self._pupil_distance, _rounded_up(self._widest(self._pupil_distance))
 
     @property
