@@ -51,7 +51,7 @@ def test_figures_as_stated(name):
 
 
 def test_the_pupils_of_the_singlet():
-    """OpticStudio 2025 R2.02, as published in Optiland's issue 710; distances to the last digit printed."""
+    """OpticStudio 2025 R2.02, as published for the validation of Optiland; to the last digit printed."""
     lens = vcc.load_lens("singlet-100mm")
     assert lens.entrance_pupil.distance == pytest.approx(6.318809 * mm, abs=1e-6 * mm)
     assert lens.exit_pupil.diameter == pytest.approx(23.397108 * mm, abs=1e-6 * mm)

@@ -62,8 +62,9 @@ LANGUAGE = """! written by hand
 RDM ; len
 EPD 3.5; WL 656.3 587.6 486.1 ! three lines; not a command
 REF 2
-YAN 0.0 10.0 &
- 14.0
+XAN 0.0 0.0 &
+ 30.0
+YAN 0.0 -10.0 30.0
 SO 0 1e11
 S 40.0 &
   8.0 1.6:40.0
@@ -87,7 +88,8 @@ def test_the_language(file):
     assert read.image_distance == pytest.approx(89.75 * mm)  # the image is where its defocus puts it
     assert read.entrance_pupil_diameter == pytest.approx(3.5 * mm)
     assert read.wavelengths == pytest.approx((587.6 * nm, 656.3 * nm, 486.1 * nm))
-    assert read.fields == (0.0, 10.0, 14.0)
+    diagonal = math.degrees(math.atan(math.sqrt(2) * math.tan(math.radians(30))))
+    assert read.fields == pytest.approx((0.0, 10.0, diagonal))
 
 
 def test_f_numbers_are_those_of_a_distant_scene(file):
@@ -141,14 +143,17 @@ def test_zoom_positions(file):
     first, second, third = (read_prescription(path, configuration=number) for number in (1, 2, 3))
     assert first.surfaces == read_prescription(path).surfaces
     assert [surface.thickness for surface in second.surfaces] == pytest.approx(
-        [8 * mm, 6 * mm, 4 * mm, 1 * mm, math.inf]
+        [8 * mm, 6 * mm, 4 * mm, 1 * mm, 7.5 * mm]
     )
     assert third.surfaces[3].thickness == pytest.approx(0.0)
     assert [each.surfaces[0].radius for each in (first, second, third)] == pytest.approx(
         [40 * mm, 41 * mm, 40 * mm]
     )
     assert [each.f_number for each in (first, second, third)] == [8, 9, 10]
-    assert (first.image_distance, second.image_distance) == (pytest.approx(7.5 * mm), None)
+    assert second.image_distance == pytest.approx(7.5 * mm)
+    solved = file(ZOOM.replace("S 90.0 7.5", "S 90.0 7.5\nPIM"))
+    images = [read_prescription(solved, configuration=number).image_distance for number in (1, 2)]
+    assert images == [pytest.approx(7.5 * mm), None]
     assert second.configurations == 3
 
 
@@ -192,6 +197,13 @@ PLAIN = seq(WITH_STOP)
         ("SI 0.0 0.0", "SI 0.0 0.0\nS 1 1", r"a surface follows the image"),
         ("SO 0.0 0.1e14", "SO 0.0 0.1e14 1.33", r"the object lies in 1\.33, not in air"),
         ("1.6\n", "0.9:30\n", r"surface 1: nd of a glass is 0\.9"),
+        (
+            "S 40.0 8.0 1.6",
+            "S 40.0 8.0 1.6 64.2",
+            r"line \d+: 64\.2 follows the radius, the thickness and the glass",
+        ),
+        ("  STO", "  GLA S1 REFL", r"surface 1 is a mirror"),
+        ("SI 0.0 0.0\n", "", r"lists 6 surfaces: .* last an image SI"),
         (PLAIN, "RDM\nSO 0 1\n", r"lists 1 surfaces"),
     ],
 )

@@ -85,7 +85,7 @@ class Glasses:
                 f"Correct the name{' in the file' if in_file else ''}, {way_out}"
             )
         if in_file:
-            way_out = f"name the maker in the file's line GCAT, {way_out}"
+            way_out = f"name the maker in the file (Zemax: its line GCAT; CODE V: after the name), {way_out}"
         else:
             way_out = f'write the maker before the name, "{_maker(found[0][0])} {name}", {way_out}'
         book, index = self._chosen(found, name, catalogues, place, way_out)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
@@ -239,22 +239,33 @@ class RealLens(Element):
         return tuple(found)
 
     def parts(self) -> tuple[Part, ...]:
-        """The surfaces' deviation from first order, the first order, and the exit pupil that light fills.
-
-        The exit pupil's disc stops no ray that the surfaces let pass: it is there for rays to be aimed at.
-        """
+        """The surfaces' deviation from first order, then the first order; twice, around a mask at the stop."""
         onward, split = self.onward, self._split if self.mask is not None else None
-        distance, radius = self.exit_window
-        last = Affine.propagation(distance)
-        window: list[Part] = [last, Faces(transmission=Circle(2 * radius)), last.inverse()]
         weighted = self.radiometry == "exact"
         if split is None:
             whole = _between(onward, self._behind, weighted)
-            return (Faces(deflection=whole), whole.first_order, *window)
+            return (Faces(deflection=whole), whole.first_order)
         front = _between(onward[:split], onward[split].distance, False)
         rear = _between(onward[split + 1 :], self._behind, weighted)
         middle: list[Part] = [Faces(deflection=front), front.first_order, Faces(transmission=self.mask)]
-        return (*middle, Faces(deflection=rear), rear.first_order, *window)
+        return (*middle, Faces(deflection=rear), rear.first_order)
+
+    def window(self, seen: Seen | None) -> tuple[Part, ...]:
+        """A disc behind the lens that all light passes on its way to the sensor: rays are aimed at it.
+
+        It stands in the first-order exit pupil, or at the end of the lens if that is far away.
+
+        Args:
+            seen: how the sensor sees the end of the lens; None if this is not known in first order.
+        """
+        distance = self._pupil_distance
+        widest = None if seen is None else self._widest_seen(distance, seen)
+        if widest is None:
+            widest = self._widest(distance)
+        steps = math.ceil(math.log(widest) / math.log1p(PUPIL_STEP) + 0.5)
+        disc = Faces(transmission=Circle(2 * (1 + PUPIL_STEP) ** steps))
+        flight = Affine.propagation(distance)
+        return (flight, disc, flight.inverse())
 
     def faces(self) -> Faces:
         """No faces: the effect of a thick element is between its planes; see `parts`."""
@@ -262,36 +273,68 @@ class RealLens(Element):
 
     @property
     @cached
-    def exit_window(self) -> tuple[float, float]:
-        """(distance, radius) of a disc that all light leaving the lens passes, metres.
-
-        The distance is from the end of the element: the first-order exit pupil, or 0 if that is far away. The
-        radius is found by tracing rays from all over the stop in all directions.
-        """
+    def _pupil_distance(self) -> float:
+        """From the end of the element to the first-order exit pupil, metres; 0 if that is far away."""
         number, length = self.stop_number, max(self.prescription.length, 1e-3)
         assert number is not None
         behind = Affine.propagation(self._behind) @ _first_order(self.onward[number + 1 :])
         exit_from_slope, slope_from_slope = behind.linear[0, 2], behind.linear[2, 2]
         # The image of the stop: where rays from its middle meet the axis again.
         far = abs(exit_from_slope) >= FARTHEST * length * abs(slope_from_slope)
-        distance = 0.0 if far else float(-exit_from_slope / slope_from_slope)
-        steps = math.ceil(math.log(self._widest(distance)) / math.log1p(PUPIL_STEP) + 0.5)
-        return distance, (1 + PUPIL_STEP) ** steps
+        return 0.0 if far else float(-exit_from_slope / slope_from_slope)
+
+    def _widest_seen(self, distance: float, seen: Seen) -> float | None:
+        """The largest distance from the axis at which light for the sensor meets a plane behind the lens, metres.
+
+        None if the plane is imaged on the sensor, or if no light reaches it.
+
+        Args:
+            distance: of the plane, from the end of the element, metres.
+            seen: how the sensor sees the end.
+        """
+        # A place p on the sensor and a place q in the plane: p = A·x + B·s, q = x + distance·s.
+        gain = seen.from_slope - distance * seen.from_place
+        if abs(gain) < 1e-9:
+            return None
+        back = _reversed(self.onward)
+        back = (replace(back[0], distance=-self._behind), *back[1:])
+
+        def met(points: Array) -> Array:
+            """How far out points (p, q, angle) are; -1 if light does not pass."""
+            p, q = points[:, 0], points[:, 1]
+            place = np.stack([q * np.cos(points[:, 2]), q * np.sin(points[:, 2])], axis=-1)
+            image = np.stack([p, np.zeros_like(p)], axis=-1)
+            slope = (image - seen.from_place * place) / gain
+            share = traced(back, np.concatenate([place - distance * slope, slope], axis=-1))[1]
+            return np.where(share > 0, q, -1.0)
+
+        reach = 2 * self._stop_radius
+        for _ in range(6):
+            p, q, angle = np.meshgrid(
+                np.linspace(0, seen.radius, 9), np.linspace(0, reach, 61), np.linspace(0, np.pi, 25), indexing="ij"
+            )
+            points = np.stack([p.ravel(), q.ravel(), angle.ravel()], axis=-1)
+            widest = float(met(points).max())
+            if widest < 0.8 * reach:
+                break
+            reach *= 2
+        if widest <= 0:
+            return None
+        return _refined(points, met, np.array([seen.radius / 8, reach / 60, np.pi / 24]))
 
     def _widest(self, distance: float) -> float:
-        """The largest distance from the axis at which light meets a plane behind the lens."""
+        """The same for light that goes anywhere: rays from all over the stop in all directions."""
         number, onward = self.stop_number, self.onward
         assert number is not None
         to_stop, behind = onward[: number + 1], onward[number:]
         back = tuple(_reversed(to_stop)[1:])
         ahead = (replace(behind[0], distance=0.0), *behind[1:])
-        stop = onward[number]
-        wide = stop.radius if math.isfinite(stop.radius) else max(self._mask_size()) / math.sqrt(2)
-        wide = 1.2 * (wide + stop.softness)  # on a curved stop, its edge is met off the plane of its vertex
+        wide = 1.2 * self._stop_radius  # on a curved stop, its edge is met off the plane of its vertex
         flight = self._behind + distance
 
         def met(rays: Array) -> Array:
-            """How far out they meet the plane; -1 for rays that do not pass."""
+            """How far out rays (r, s, t) from the stop meet the plane; -1 for rays that do not pass."""
+            rays = np.insert(rays, 1, 0.0, axis=1)
             found, share = traced(ahead, rays)
             _, before = traced(back, rays)
             away = np.hypot(*(found[..., :2] + flight * found[..., 2:]).T)
@@ -300,20 +343,19 @@ class RealLens(Element):
         r, s, t = np.meshgrid(
             np.linspace(0, wide, 13), np.linspace(-2, 2, 81), np.linspace(0, 2, 25), indexing="ij"
         )
-        rays = np.stack([r, 0 * r, s, t], axis=-1).reshape(-1, 4)
-        away = met(rays)
-        if away.max() < 0:
+        rays = np.stack([r.ravel(), s.ravel(), t.ravel()], axis=-1)
+        if met(rays).max() <= 0:
             raise InputError(f"no light passes {self.label}: its rims stop all rays from its stop")
-        step = np.array([wide / 12, 0.0, 0.05, 0.083])
-        draw = np.random.default_rng(0)
-        for _ in range(8):
-            best = np.argsort(away)[-40:]
-            rays, away = rays[best], away[best]
-            near = rays + draw.uniform(-1, 1, (60, *rays.shape)) * step
-            rays = np.concatenate([rays, near.reshape(-1, 4)])
-            away = np.concatenate([away, met(near.reshape(-1, 4))])
-            step = step / 2
-        return float(away.max())
+        return _refined(rays, met, np.array([wide / 12, 0.05, 0.083]))
+
+    @property
+    def _stop_radius(self) -> float:
+        """Half the size of the stop, with its soft edge, metres."""
+        number = self.stop_number
+        assert number is not None
+        stop = self.onward[number]
+        radius = stop.radius if math.isfinite(stop.radius) else max(self._mask_size()) / math.sqrt(2)
+        return radius + stop.softness
 
     def _mask_size(self) -> tuple[float, float]:
         assert self.mask is not None
@@ -354,6 +396,32 @@ class RealLens(Element):
         words += ["dispersion"] if self.depends_on_band else []
         words += [f"{self.radiometry} radiometry"]
         return ", ".join([*words, f"from {self.source}"] if self.source else words)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """How a sensor sees the end of a lens: a ray (x, s) there meets the sensor at from_place·x + from_slope·s.
+
+    Args:
+        from_place: likewise along y; both are relative to the ray along the lens's axis.
+        from_slope: metres.
+        radius: of the disc around that ray's place that the sensor is within, metres.
+    """
+
+    from_place: float
+    from_slope: float
+    radius: float
+
+
+def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float:
+    """The largest value of a function around the points of a grid where it is large, by repeated random steps."""
+    draw, away = np.random.default_rng(0), met(points)
+    for _ in range(8):
+        best = np.argsort(away)[-40:]
+        points, away = points[best], away[best]
+        near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
+        points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
+    return float(away.max())
 
 
 def _is_empty(surface: Surface, before: float) -> bool:

@@ -26,6 +26,7 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import Deflection
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
+from vcc.optics.real_lens import RealLens, Seen
 from vcc.optics.sensor import Sensor
 from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
@@ -288,6 +289,8 @@ class Train(Value, Shown):
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
         for element, parts in met_in_order((*self.elements, *self._pixels)):
+            if isinstance(element, RealLens):
+                parts = (*parts, *element.window(self._seen_from_sensor(element)))
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in parts:
@@ -308,6 +311,31 @@ class Train(Value, Shown):
                 approach, leaving = Affine.identity(), stages[-1].leaving
             here += element.length
         return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
+
+    def _seen_from_sensor(self, lens: RealLens) -> Seen | None:
+        """How the sensor sees the end of a real lens; None behind elements that are not affine or round."""
+        end = lens.z + lens.length
+        behind = [
+            each for each in self.elements if each is not lens and each.z >= end and not touch(each.z, lens.z)
+        ]
+        parts = [part for element in behind for part in element.parts()]
+        faces = [part for part in parts if isinstance(part, Faces)]
+        if any(each.bending is not None or each.spread is not None for each in faces):
+            return None
+        ray, here = Affine.identity(), end
+        for element in behind:
+            ray, here = Affine.propagation(element.z - here) @ ray, element.z + element.length
+            for part in element.parts():
+                step = part if isinstance(part, Affine) else part.affine
+                ray = ray if step is None else about(element.decentre, step) @ ray
+        ray = Affine.propagation(self.sensor.z - here) @ ray
+        from_place, from_slope = ray.linear[:2, :2], ray.linear[:2, 2:]
+        if not all(np.allclose(each, each[0, 0] * np.eye(2), atol=1e-12) for each in (from_place, from_slope)):
+            return None
+        axis = ray(np.array([*lens.decentre, 0.0, 0.0]))[:2]
+        half = np.array(self.sensor.size[::-1]) / 2
+        corner = np.abs(np.array(self.sensor.decentre) - axis) + half
+        return Seen(float(from_place[0, 0]), float(from_slope[0, 0]), float(np.hypot(*corner)))
 
     @property
     def _pixels(self) -> tuple[Element, ...]:

@@ -9,6 +9,7 @@ first zoom position; ``ZOO n`` states n positions, and ``ZOO THI S3 …`` one va
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator
@@ -29,6 +30,7 @@ from vcc.prescriptions.assembly import (
     radius_of,
     real,
     text_of,
+    to_axis,
     without_r2,
 )
 from vcc.prescriptions.media import AIR, Media, Medium
@@ -51,7 +53,7 @@ _ZERO = {
 }
 """Commands that are supported only with values of 0."""
 _NOT_ROUND = {"REX": "a rectangular", "REY": "a rectangular", "ELX": "an elliptical", "ELY": "an elliptical"}
-_OF_SURFACES = {"STO", "GLA", *_NUMBERS, *_REFUSED, *_ZERO, *_NOT_ROUND}
+_OF_SURFACES = {"STO", "GLA", "PIM", *_NUMBERS, *_REFUSED, *_ZERO, *_NOT_ROUND}
 _WITHOUT_EFFECT = re.compile(r"THC|CCY|KC|[A-J]C|GLC|V[UL][XY]|WT[FWZ]|TIT|[XY](AN|IM|RI|OB)|POS|SLB|DLT|PIM")
 """What does not change the lens between zoom positions: codes of optimisation, vignetting, fields, titles."""
 _FICTITIOUS = re.compile(r"(\d{3,6})\.(\d{3,6})|(\d{3})(\d{3})|(\d\.\d+):(\d+\.?\d*)")
@@ -139,6 +141,10 @@ class _Reader:
         row.values["CUY" if self.curvatures else "RDY"] = self._value(values[0])
         row.values["THI"] = self._value(values[1]) if len(values) > 1 else 0.0
         row.glass = " ".join(values[2:3])
+        if any(real(value) is not None for value in values[3:]):
+            raise InputError(
+                f"{self.place}: {' '.join(values[3:])} follows the radius, the thickness and the glass"
+            )
         if any(value.upper().startswith("REFL") for value in values[2:]):
             raise not_supported(self.surface(row), "a mirror (REFL)")
 
@@ -177,8 +183,8 @@ class _Reader:
             row.stop = True
         elif name == "GLA":
             row.glass = " ".join(values[:1])
-        elif name == "THI" and qualifier:
-            row.solve = values
+        elif name == "PIM" or (name == "THI" and qualifier):
+            row.solve = [name, *values]
         elif name in _NUMBERS and qualifier != "EDG" and values:
             if name in ("RDY", "CUY"):
                 row.values.pop("CUY" if name == "RDY" else "RDY", None)
@@ -220,19 +226,19 @@ class _Reader:
     def _solve(self, moved: set[int]) -> bool:
         last = self.rows[-2]
         for row in self.rows:
-            kind, *rest = row.solve or [""]
-            if row.number in moved or not kind:
+            if row.number in moved or not row.solve:
                 continue
+            kind, *rest = row.solve[1:] or [""]
             ends = re.fullmatch(r"S(\d{1,6})\.\.(\d{1,6})", (rest or [""])[0].upper())
             if kind.upper() == "OAL" and ends and int(ends[1]) <= row.number == int(ends[2]) - 1 and len(rest) > 1:
                 before = self.rows[int(ends[1]) : row.number]
                 row.values["THI"] = self._value(rest[1]) - math.fsum(each.values["THI"] for each in before)
             elif row is not last:
                 raise InputError(
-                    f"{self.surface(row)} has the solve THI {' '.join(row.solve)}, which is not applied in other "
+                    f"{self.surface(row)} has the solve {' '.join(row.solve)}, which is not applied in other "
                     "configurations: save the file with this position as the only one"
                 )
-        return last.number not in moved
+        return bool(last.solve) and last.number not in moved
 
     def number(self, name: str, column: int = 0) -> float | None:
         values = self.system.get(name, [])
@@ -251,9 +257,9 @@ def read(content: bytes, file: Path, media: Media, configuration: int | None) ->
     for line, words in _commands(text_of(content)):
         reader.run(line, words)
     rows = reader.rows
-    if len(rows) < 3:
+    if len(rows) < 3 or rows[-1].number >= 0:
         raise InputError(
-            f"{file} lists {len(rows)} surfaces: a CODE V lens has an object SO, surfaces S, an image SI"
+            f"{file} lists {len(rows)} surfaces: a CODE V lens has an object SO, surfaces S, and last an image SI"
         )
     dimension = (reader.system.get("DIM") or ["M"])[0].upper()
     if dimension not in _UNITS:
@@ -272,6 +278,7 @@ def read(content: bytes, file: Path, media: Media, configuration: int | None) ->
         f_number = aperture = None  # those of a near object: the stop's opening counts
     elif aperture:
         f_number = 1 / (2 * aperture)
+    x, y = ([real(value) or 0.0 for value in reader.system.get(name, [])] for name in ("XAN", "YAN"))
     waves = [(real(value) or 0.0) * nm for value in reader.system.get("WL", [])]
     reference = int(min(max(reader.number("REF") or 1, 1), 1e3)) - 1
     return assembled(
@@ -281,7 +288,7 @@ def read(content: bytes, file: Path, media: Media, configuration: int | None) ->
         f_number=f_number if f_number and f_number > 0 else None,
         entrance_pupil_diameter=pupil * unit if pupil and pupil > 0 else None,
         wavelengths=tuple(waves[reference : reference + 1] + waves[:reference] + waves[reference + 1 :]),
-        fields=tuple(abs(real(value) or 0.0) for value in reader.system.get("YAN", [])),
+        fields=to_axis(list(itertools.zip_longest(x, y, fillvalue=0.0))),
         configurations=many,
     )
 
@@ -335,6 +342,8 @@ def _medium(written: str, private: dict[str, Glass | float], media: Media, place
         return AIR
     if name.upper() in media.given:
         return media.of_name(name, [], place)
+    if name.upper().startswith("REFL"):
+        raise not_supported(place, "a mirror (REFL)")
     if name in private:
         own = private[name]
         return media.of_glass(name, own, place) if isinstance(own, Glass) else Medium(own, name)

@@ -51,7 +51,7 @@ _PICKUP = "4"
 """The solve of a curvature that is copied from another surface."""
 _SYSTEM = {"UNIT", "MODE", "NAME", "GCAT", "FNUM", "ENPD", "FTYP", "XFLN", "YFLN", "PWAV", "WAVN", "WAVL", "MNUM"}
 _NUMBERED = {"PARM", "XDAT", "WAVM"}
-_THICKNESS_SOLVES = {"PZUP", "TCOM", "TOLE", "MAZH", "CHZH", "MAZA", "CHZA", "EDGE", "OPDZ", "CMPN"}
+_THICKNESS_SOLVES = {"PZUP", "TCOM", "TOLE", "MAZH"}
 _NOT_ROUND = {
     "SQAP": "a rectangular aperture",
     "ELAP": "an elliptical aperture",
@@ -62,7 +62,19 @@ _NOT_ROUND = {
     "USOB": "an obscuration",
     "SPID": "a spider",
 }
-_PER_SURFACE = {"STOP", "TYPE", "CURV", "DISZ", "GLAS", "DIAM", "CONI", "CLAP", *_THICKNESS_SOLVES, *_NOT_ROUND}
+_PER_SURFACE = {
+    "STOP",
+    "TYPE",
+    "CURV",
+    "DISZ",
+    "GLAS",
+    "DIAM",
+    "CONI",
+    "CLAP",
+    "PPAR",
+    *_THICKNESS_SOLVES,
+    *_NOT_ROUND,
+}
 _SUPPORTED = {"STANDARD", "EVENASPH", "XASPHERE"}
 _TYPES = {
     "ODDASPHE": "an odd asphere",
@@ -372,6 +384,8 @@ def _solve(surfaces: list[_Lines], file: Path) -> bool:
             surface.found["CURV"] = (surface.found["CURV"][0], [repr(scaled)])
         elif curve[1:2] not in ([], ["0"], ["1"]):
             raise _unsolved(place, f"CURV {' '.join(curve)}")
+        if "PPAR" in surface.found:
+            raise _unsolved(place, "PPAR")
         if glass[1:2] == ["2"] and len(glass) > 2:
             source = _source(surface, "GLAS", 2, surfaces, place)
             surface.found["GLAS"] = (surface.found["GLAS"][0], source.values("GLAS")[:1] or [_MODEL_GLASS])
