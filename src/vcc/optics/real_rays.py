@@ -37,6 +37,8 @@ SEARCHED = 65
 """Rays per side in the search for the light of a point; odd, so that one is in the middle."""
 ROUNDS = 12
 """Most rounds of this search: the box grows, or shrinks onto the light."""
+NEAR_AXIS = 1e-4
+"""Slope from the axis of the points that measure the scale of the image."""
 STEPS, ITERATIONS = 12, 5
 """Steps from the axis to a field on which chief rays are followed, and Newton's iterations in each."""
 SPECTRUM = (486.1327e-9, 587.5618e-9, 656.2725e-9)
@@ -50,7 +52,7 @@ class Bundle(Brief):
     Args:
         places: (n, 2) on the sensor, metres.
         slopes: (n, 2) there.
-        light: (n,): what each ray carries; the sum is the light of the point through 1 m² of the entrance plane.
+        light: (n,): the area of the entrance plane that each ray stands for, times its share of light, m².
         stop: (n, 2): places in the stop, in units of its radius.
     """
 
@@ -595,6 +597,19 @@ def fields_of(
     heights = ends @ along
     seen = np.arctan(slopes @ -along)
     return Fields(slopes, heights, heights / half, seen, chiefs)
+
+
+def image_scale(train: Train, distance: float, along: Array) -> tuple[float, float]:
+    """Heights of chief rays near the axis on the sensor, metres: per slope of the field, and of the axis.
+
+    Args:
+        train: the camera at one wavelength.
+        distance: of the points, metres.
+        along: direction of fields and heights, a unit vector.
+    """
+    chiefs = chief_rays(train, distance, slopes=np.outer([-NEAR_AXIS, NEAR_AXIS], along))
+    ends = (to_sensor(train, chiefs, rims=False)[0][:, :2] - train.sensor.decentre) @ along
+    return float(ends[1] - ends[0]) / (2 * NEAR_AXIS), float(ends.mean())
 
 
 def half_diagonal(train: Train) -> float:
