@@ -11,6 +11,7 @@ from typing import Any, Literal, Self, TypeVar, Unpack
 from vcc.advice.colour import colour_section, middle_of
 from vcc.advice.explain import Explanation, explained
 from vcc.advice.of_images import Cautions
+from vcc.advice.real_lens import lens_section
 from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress, part_of
@@ -22,7 +23,7 @@ from vcc.optics.band import Band
 from vcc.optics.bands import refuse, single_way, trains_of
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
-from vcc.optics.focusing import focused_train
+from vcc.optics.focusing import By, focused_train, refocused_train
 from vcc.optics.plenoptic import Plenoptic
 from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
@@ -112,16 +113,32 @@ class Camera(Train):
         train = focused_train(elements, sensor, distance)
         return cls(train.elements, train.sensor, name=name)
 
-    def focused_at(self, distance: float) -> Self:
-        """The same camera with its sensor at the plane where a point is sharp; see `Camera.focused`.
+    def focused_at(
+        self,
+        distance: float,
+        *,
+        by: By = "first order",
+        frequency: float | None = None,
+        fields: Sequence[float] = (0.0,),
+    ) -> Self:
+        """The same camera with its sensor at the plane where a point is sharp.
 
         Args:
             distance: Z, from the point to the entrance plane, metres, positive; ``math.inf`` for a distant scene.
+            by: ``"first order"``: as `Camera.focused`; ``"spot"``: by real rays, where the mean square radius of
+                spots is smallest; ``"mtf"``: where their contrast at a frequency is largest on average along x and
+                y. `vcc.analysis.best_focus` returns the sizes of the spots as well.
+            frequency: of ``"mtf"``, cycles per metre on the sensor.
+            fields: of ``"spot"`` and ``"mtf"``: which points count, alike: their images' distances from the middle
+                of the sensor, as fractions of its half diagonal. The default is the axis alone. The lines F, d
+                and C count alike where the camera disperses.
 
         Raises:
-            InputError: as for `Camera.focused`.
+            InputError: as for `Camera.focused`; by real rays: nothing bounds the light, a diffuser, or a field
+                without light.
         """
-        return type(self).focused(self.elements, self.sensor, distance, name=self.name)
+        train = refocused_train(self.elements, self.sensor, distance, by, frequency, fields)
+        return type(self)(train.elements, train.sensor, name=self.name)
 
     def replace(
         self,
@@ -483,11 +500,15 @@ class Camera(Train):
             progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
         """
-        chosen = How.of(how, options)
+        text = self._explained(light_field, How.of(how, options), executor, progress)
+        section = lens_section(self, light_field.grid.wavelengths)
+        return text.with_section(section) if section else text
+
+    def _explained(self, light_field: Samples, how: How, executor: Any, progress: Progress | None) -> Explanation:
         if self.depends_on_bands:
-            return self._explained_by_bands(light_field, chosen, executor, progress)
-        plan = self.compile(light_field, chosen, progress=progress)
-        return explained(self, light_field, plan, chosen, executor)
+            return self._explained_by_bands(light_field, how, executor, progress)
+        plan = self.compile(light_field, how, progress=progress)
+        return explained(self, light_field, plan, how, executor)
 
     def _explained_by_bands(
         self, light_field: Samples, how: How, executor: Any, progress: Progress | None
@@ -499,9 +520,7 @@ class Camera(Train):
             raise InputError("nothing passes this camera in any channel: there is no plan to explain")
         shown = middle_of(trains, grid.wavelengths)
         one = type(self)(trains[shown].train.elements, trains[shown].train.sensor, name=self.name)
-        text = one.explain(
-            SomeChannels.of(light_field, trains[shown].channels), how, executor=executor, progress=progress
-        )
+        text = one._explained(SomeChannels.of(light_field, trains[shown].channels), how, executor, progress)
         return text.with_section(colour_section(self, trains, grid, shown))
 
     def light_field_at(

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics import Scatter
+from vcc.optics.real_rays import entrance_box, light_stages, rays_from, to_sensor
 from vcc.optics.train import Stage, Train
 
 Array = NDArray[np.float64]
@@ -69,54 +69,27 @@ class PointRays:
     def through_stops(cls, camera: Train, distance: float, field: Pair) -> PointRays:
         """The rays that pass the camera's stops.
 
-        Stops behind elements that bend or scatter rays are ignored: they do not bound the rays at the entrance.
+        Stops behind plates, arrays and diffusers are ignored: they do not bound the rays at the entrance. Rays
+        that pass a real lens are found by tracing.
 
         Raises:
             InputError: no stop bounds the rays, or none passes.
         """
-        rays = cls(camera, distance, field)
-        low, high = np.full(2, -np.inf), np.full(2, np.inf)
-        disturbed = False
-        for stage in camera.stages:
-            if disturbed and np.abs(stage.approach.linear[:2, 2:]).max() > 0:
-                break
-            corners = rays._seen_from_the_entrance(stage)
-            if corners is not None:
-                low, high = np.maximum(low, corners.min(axis=0)), np.minimum(high, corners.max(axis=0))
-            disturbed = disturbed or stage.faces.bending is not None or stage.faces.spread is not None
-        if not (np.isfinite(low).all() and np.isfinite(high).all()):
-            raise InputError(
-                "nothing bounds the light that this camera takes in (no stop of known size stands before the "
-                "first plate, array or diffuser): give the lens a diameter, or pass aperture=(width, height) in "
-                "metres"
-            )
-        if (high <= low).any():
-            raise InputError("no light of this point passes the camera's stops: it lies outside the field of view")
+        low, high = entrance_box(camera, distance, field)
         (x, y), (width, height) = ((low + high) / 2).tolist(), (high - low).tolist()
         return cls(camera, distance, field, (x, y), (width, height))
 
-    def _seen_from_the_entrance(self, stage: Stage) -> Array | None:
-        """The corners of a stage's opening, (4, 2), projected along the point's rays to the entrance plane."""
-        size = (math.inf, math.inf) if stage.faces.pattern is None else stage.faces.pattern.size
-        at = stage.arriving(self.from_places(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])))[:, :2]
-        stage_from_entrance = Affine.from_parts(np.stack([at[1] - at[0], at[2] - at[0]], axis=1), at[0])
-        if not (all(map(math.isfinite, size)) and stage_from_entrance.is_invertible()):
-            return None
-        corners = np.array([[x, y] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * size
-        return stage_from_entrance.inverse()(corners + stage.element.decentre)
-
     def from_places(self, places: Array) -> Array:
         """The rays (u, v, s, t) of the point through positions (..., 2) of the entrance plane."""
-        slopes = places / self.distance - np.asarray(
-            self.field
-        )  # s = (u − X)/Z; parallel for an infinite distance
-        return np.concatenate([places, slopes], axis=-1)
+        return rays_from(self.distance, np.asarray(self.field), places)
 
     @property
     def image(self) -> Array:
-        """(x, y) on the sensor of the ray through the centre by affine optics, metres."""
-        to_sensor = self.camera.rays_at(self.camera.sensor.z)
-        return np.asarray(to_sensor(self.from_places(np.array(self.middle)))[:2])
+        """(x, y) on the sensor of the ray through the centre by affine optics and real lenses, metres."""
+        rays, _ = to_sensor(self.camera, self.from_places(np.array(self.middle)), rims=False)
+        if not np.isfinite(rays).all():
+            raise InputError("no ray through the middle of the opening reaches the sensor: pass aperture=")
+        return np.asarray(rays[:2])
 
     def in_cells(self, cells: int | None, steps: Array) -> Spot:
         """The light of each cell of the opening.
@@ -149,17 +122,27 @@ class PointRays:
         cell = np.array(self.size) / counts
         x, y = ((np.arange(n) - (n - 1) / 2) * c + m for n, c, m in zip(counts, cell, self.middle, strict=True))
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        near = NEARBY * cell
-        # Three rays per cell: its centre, and one next to it along each axis.
+        rays, share, lost = self._differentials(places, NEARBY * cell)
+        if lost.any():  # a lens stops the neighbour of a ray that it lets pass: the one on the other side is taken
+            rays[:, lost], _, still = self._differentials(places[lost], -NEARBY * cell)
+            rays[1:, np.flatnonzero(lost)[still]] = rays[0, np.flatnonzero(lost)[still]]
+        return Spot(rays[0, :, :2], _box(rays), share / len(places))
+
+    def _differentials(self, places: Array, near: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Three rays a cell at the sensor: its middle, and one next to it along each axis; and the middle's light.
+
+        The last are cells whose middle passes a real lens, while one of its neighbours does not.
+        """
         rays = np.stack([self.from_places(places + near * beside) for beside in ((0, 0), (1, 0), (0, 1))])
-        share = np.full(len(places), 1.0 / len(places))
-        for stage in self.camera.stages:
+        share, lost = np.ones(len(places)), np.zeros(len(places), dtype=bool)
+        for stage in light_stages(self.camera):
             rays = stage.approach(rays)
             if stage.faces.pattern is not None:
                 share = share * _mean_transmission(stage, rays)
-            rays = stage.deflected(rays)
-        rays = self.camera.approach_to_sensor(rays)
-        return Spot(rays[0, :, :2], _box(rays), share)
+            rays, light = stage.crossed(rays)
+            share = share * light[0]
+            lost |= (light[1:] == 0).any(axis=0)
+        return self.camera.approach_to_sensor(rays), share, lost & (share > 0)
 
     def drawn(self, rays: int, seed: int) -> list[Spot]:
         """Rays drawn over the opening and the kernels of diffusers, in two halves that are each evenly
@@ -171,7 +154,7 @@ class PointRays:
         """
         from scipy.stats import qmc
 
-        stages = self.camera.stages
+        stages = light_stages(self.camera)
         spreads = [stage.faces.spread for stage in stages if stage.faces.spread is not None]
         dimensions = 2 + sum(2 + (len(spread.kernels) > 1) for spread in spreads)
         power = math.ceil(math.log2(rays))
@@ -186,7 +169,8 @@ class PointRays:
             if stage.faces.pattern is not None:
                 with stage.named():
                     share = share * np.asarray(stage.faces.pattern(x, y), dtype=np.float64)
-            bundle = stage.deflected(bundle)
+            bundle, light = stage.crossed(bundle)
+            share = share * light
             if stage.faces.spread is not None:
                 spread = stage.faces.spread
                 numbers = [points[:, next(column)] for _ in range(2 + (len(spread.kernels) > 1))]

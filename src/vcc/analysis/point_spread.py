@@ -50,7 +50,7 @@ class PointSpread(Shown):
         field: direction of the point, as slopes (X/Z, Y/Z).
         collecting_area: the part of the entrance plane whose light arrives, weighted by transmission, m². A
             point of radiant intensity I (W/sr) at distance Z gives I · collecting_area / Z² watts at the
-            sensor's plane.
+            sensor's plane. Behind a real lens, I is that along the axis of a small Lambertian surface (I·cosθ).
         outside: the share of the light outside ``values``.
         sampling_error: estimate, root mean square over the pixels, in units of the values; 0 without diffusers.
         finer: the same light in parts of the pixels, used for spectra; None if the pixels are fine enough.
@@ -111,13 +111,15 @@ def psf(
     """The image of a point of light, by tracing its rays through the camera.
 
     Args:
-        camera: any; of the sensor only position, pitch and lattice matter, not the size. Paraxial and geometric.
+        camera: any; of the sensor only position, pitch and lattice matter, not the size. Geometric; paraxial but
+            for real lenses, which refract exactly. For each wavelength: ``camera.at_wavelength(550 * nm)``.
         distance: of the point before the entrance plane, metres, positive; may be infinite.
         field: direction of the point, as slopes (X/Z, Y/Z): the tangents of its field angles, right and down.
         pitch: of the square pixels that collect the light, metres; None uses the sensor's.
         shape: (rows, columns) of pixels; None uses odd numbers that contain all light.
         on_pixels: False centres the middle pixel (index n // 2) on the image of the point through the centre
-            of the opening, by affine optics; True uses the sensor's own pixels (then without ``pitch``).
+            of the opening, by affine optics and real lenses; True uses the sensor's own pixels (then
+            without ``pitch``).
         aperture: (width, height) of the opening in the entrance plane, metres; None determines it from the
             camera's stops.
         cells: without diffusers: how many divide the opening's longer side; None uses 16 per pixel of the image,

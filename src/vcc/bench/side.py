@@ -225,12 +225,14 @@ def _away(distance: float) -> str:
 def _rays(point: Point, paths: Paths) -> Json:
     """The fan of rays from a point: each ray as a list of [z, height, share of light left]."""
     listed = []
-    for height, share, first in zip(paths.positions[..., AXIS], paths.shares, paths.starts, strict=True):
+    for z, height, share, first in zip(
+        paths.depths, paths.positions[..., AXIS], paths.shares, paths.starts, strict=True
+    ):
         ray = []
         for plane in range(first, len(paths.z)):
             if plane > first and share[plane] <= 0:
                 break
-            ray.append([_short(paths.z[plane]), _short(height[plane]), round(float(share[plane]), 3)])
+            ray.append([_short(z[plane]), _short(height[plane]), round(float(share[plane]), 3)])
         listed.append(ray)
     return {"colour": point.role, "distance": _distance(point.distance), "words": point.label, "paths": listed}
 

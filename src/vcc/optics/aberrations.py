@@ -7,7 +7,7 @@ bends rays, and then an affine map; plans trace the surfaces themselves.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,29 @@ class Aberrations(Value):
         found, share = self.through(rays)
         return np.where(share[..., None] > 0, self._from_b(found), np.nan)
 
+    def crossed(self, rays: Array) -> tuple[Array, Array]:
+        """E of rays (..., 4) in plane a, and their light (...): 0 for rays that do not pass, which E puts at 0.
+
+        Light is weighted by étendue: of rays that are evenly spaced in place and slope in plane a, by cos⁴θ there
+        where light behind plane b counts by exact angles, and by the ratio of both planes' cos⁴θ where it counts
+        by slopes: a lens in air conserves the étendue cosθ·dω·dA = cos⁴θ·ds·dt·dx·dy.
+        """
+        found, share = self.through(rays)
+        light = share * _cosine_fourth(rays)
+        if not self.cosine_fourth:
+            light = light / _cosine_fourth(found)
+        return np.where(share[..., None] > 0, self._from_b(found), 0.0), light
+
+    @property
+    @cached
+    def without_rims(self) -> Aberrations:
+        """The same surfaces without their clear diameters."""
+        free = (
+            tuple(replace(each, radius=np.inf, softness=0.0) for each in way) for way in (self.onward, self.back)
+        )
+        onward, back = free
+        return replace(self, onward=onward, back=back)
+
     def shares(self, rays: Array) -> Array:
         """The share of light that passes of rays (..., 4) in plane a, without the factor cos⁴θ."""
         return self.through(rays)[1]
@@ -91,6 +114,11 @@ class Aberrations(Value):
     @cached
     def _inverse(self) -> Affine:
         return self.first_order.inverse()
+
+
+def _cosine_fourth(rays: Array) -> Array:
+    """cos⁴ of the angles between rays (..., 4) and the axis."""
+    return np.asarray(1 / (1 + (rays[..., 2:] ** 2).sum(axis=-1)) ** 2)
 
 
 def _flown(rays: Array, distance: float) -> Array:

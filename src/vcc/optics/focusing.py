@@ -1,10 +1,10 @@
-"""Place of the sensor for a sharp image, by first-order optics."""
+"""Place of the sensor for a sharp image, by first-order optics or by real rays."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,12 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.optics.faces import Element
+from vcc.optics.real_rays import bands_of, bundle, fields_of, sharpest_shift
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train, touch
 
+By = Literal["first order", "spot", "mtf"]
+"""What a focus makes best."""
 _FAR = 1e9
 """Metres; a place behind all elements."""
 _PARALLEL = 1e-9
@@ -54,6 +57,52 @@ def focused_train(elements: Iterable[Element], sensor: Sensor, distance: float, 
         diverging = float((rays[:2, :2] * rays[2:, :2]).sum()) >= 0  # even parallel light spreads
         raise InputError(_why_not_behind(listed, end + behind, distance, diverging))
     return Train(listed, _at(sensor, end + max(behind, 0.0)), name=name)
+
+
+def refocused_train(
+    elements: Iterable[Element],
+    sensor: Sensor,
+    distance: float,
+    by: By,
+    frequency: float | None = None,
+    fields: Sequence[float] = (0.0,),
+) -> Train:
+    """A train whose sensor is placed where points are sharpest by real rays, from the first-order focus on.
+
+    Args:
+        elements: as in `focused_train`.
+        sensor: likewise.
+        distance: likewise.
+        by: see `vcc.Camera.focused_at`.
+        frequency: cycles per metre on the sensor.
+        fields: fractions of the sensor's half diagonal; each counts alike, as each wavelength does.
+
+    Raises:
+        InputError: as in `focused_train`, `real_rays.bundle` and `real_rays.fields_of`; a focus within the last
+            element.
+    """
+    check_by(by, frequency)
+    train = focused_train(elements, sensor, distance)
+    if by == "first order":
+        return train
+    _, trains = bands_of(train, None)
+    points = fields_of(trains[len(trains) // 2], distance, fields, None).slopes
+    bundles = [bundle(one, distance, point) for point in points for one in trains]
+    z = train.sensor.z + sharpest_shift(bundles, by, frequency)
+    return Train(train.elements, _at(sensor, z))
+
+
+def check_by(by: str, frequency: float | None) -> None:
+    """Raise an error for another way to focus, or a frequency that it does not use or lacks."""
+    checks.one_of("by", by, get_args(By))
+    if by == "mtf":
+        if frequency is None:
+            raise InputError(
+                'by="mtf" needs frequency=, in cycles per metre on the sensor: 30e3 is 30 a millimetre'
+            )
+        checks.above_zero("frequency", frequency)
+    elif frequency is not None:
+        raise InputError(f'frequency belongs to by="mtf", not to by={by!r}: leave it out')
 
 
 def _at(sensor: Any, z: float) -> Any:

@@ -90,7 +90,7 @@ class RealLens(Element):
                 f"{self.label} has no plane for a mask: the stop of "
                 f"{self.prescription.source or 'its prescription'} must be a flat surface in air, between others"
             )
-        if self._stop_number is None:
+        if self.stop_number is None:
             raise InputError(
                 f"nothing bounds the light through {self.label}: its prescription marks no stop and states no "
                 "diameters. Give the surfaces diameters"
@@ -189,7 +189,7 @@ class RealLens(Element):
     # --- surfaces
 
     @property
-    def _stop_number(self) -> int | None:
+    def stop_number(self) -> int | None:
         """The position of the surface that limits the light: the marked stop, or the smallest diameter."""
         surfaces = self.prescription.surfaces
         for n, surface in enumerate(surfaces):
@@ -201,7 +201,7 @@ class RealLens(Element):
     @property
     def _split(self) -> int | None:
         """The position of the stop if a mask can stand in its plane: flat, in air on both sides."""
-        number, surfaces = self._stop_number, self.prescription.surfaces
+        number, surfaces = self.stop_number, self.prescription.surfaces
         if number is None or not surfaces[number].stop:
             return None
         stop = surfaces[number]
@@ -211,7 +211,7 @@ class RealLens(Element):
 
     @property
     @cached
-    def _onward(self) -> tuple[Refraction, ...]:
+    def onward(self) -> tuple[Refraction, ...]:
         """All surfaces as light meets them from the plane z on."""
         surfaces, opening = self.prescription.surfaces, self.prescription.opening(self.stop_diameter)
         found: list[Refraction] = []
@@ -240,7 +240,7 @@ class RealLens(Element):
 
     def parts(self) -> tuple[Part, ...]:
         """The surfaces' deviation from first order, then the first order; twice, around a mask at the stop."""
-        onward, split = self._onward, self._split if self.mask is not None else None
+        onward, split = self.onward, self._split if self.mask is not None else None
         weighted = self.radiometry == "exact"
         if split is None:
             whole = _between(onward, self._behind, weighted)
@@ -275,9 +275,9 @@ class RealLens(Element):
     @cached
     def _pupil_distance(self) -> float:
         """From the end of the element to the first-order exit pupil, metres; 0 if that is far away."""
-        number, length = self._stop_number, max(self.prescription.length, 1e-3)
+        number, length = self.stop_number, max(self.prescription.length, 1e-3)
         assert number is not None
-        behind = Affine.propagation(self._behind) @ _first_order(self._onward[number + 1 :])
+        behind = Affine.propagation(self._behind) @ _first_order(self.onward[number + 1 :])
         exit_from_slope, slope_from_slope = behind.linear[0, 2], behind.linear[2, 2]
         # The image of the stop: where rays from its middle meet the axis again.
         far = abs(exit_from_slope) >= FARTHEST * length * abs(slope_from_slope)
@@ -296,7 +296,7 @@ class RealLens(Element):
         gain = seen.from_slope - distance * seen.from_place
         if abs(gain) < 1e-9:
             return None
-        back = _reversed(self._onward)
+        back = _reversed(self.onward)
         back = (replace(back[0], distance=-self._behind), *back[1:])
 
         def met(points: Array) -> Array:
@@ -324,7 +324,7 @@ class RealLens(Element):
 
     def _widest(self, distance: float) -> float:
         """The same for light that goes anywhere: rays from all over the stop in all directions."""
-        number, onward = self._stop_number, self._onward
+        number, onward = self.stop_number, self.onward
         assert number is not None
         to_stop, behind = onward[: number + 1], onward[number:]
         back = tuple(_reversed(to_stop)[1:])
@@ -351,9 +351,9 @@ class RealLens(Element):
     @property
     def _stop_radius(self) -> float:
         """Half the size of the stop, with its soft edge, metres."""
-        number = self._stop_number
+        number = self.stop_number
         assert number is not None
-        stop = self._onward[number]
+        stop = self.onward[number]
         radius = stop.radius if math.isfinite(stop.radius) else max(self._mask_size()) / math.sqrt(2)
         return radius + stop.softness
 

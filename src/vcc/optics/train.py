@@ -104,6 +104,14 @@ class Stage(Brief):
         still = np.zeros_like(slopes[0])
         return np.asarray(rays + np.stack([still, still, *slopes], axis=-1))
 
+    def crossed(self, rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Rays (..., 4) behind the deflection, and their light (...), as in `Aberrations.crossed`."""
+        if not isinstance(self.faces.bending, Aberrations):
+            return self.deflected(rays), np.ones(rays.shape[:-1])
+        middle = [*self.element.decentre, 0.0, 0.0]
+        found, light = self.faces.bending.crossed(rays - middle)
+        return found + middle, light
+
     @contextmanager
     def named(self) -> Iterator[None]:
         """Add the element's name to errors raised within."""

@@ -157,8 +157,8 @@ def draw_optical_axis(axes: Axes) -> None:
 
 def draw_paths(axes: Axes, distance: float, paths: Paths, axis: int, colour: str, width: float = 1.1) -> None:
     """Each ray in pieces, fainter where it lost light; a dot where it is stopped."""
-    z, heights = paths.z / mm, paths.positions[..., axis] / mm
-    for height, shares, first in zip(heights, paths.shares, paths.starts, strict=True):
+    depths, heights = paths.depths / mm, paths.positions[..., axis] / mm
+    for z, height, shares, first in zip(depths, heights, paths.shares, paths.starts, strict=True):
         for piece in range(first, len(z) - 1):
             share = shares[piece + 1]
             if share <= 0:
@@ -174,8 +174,8 @@ def draw_paths(axes: Axes, distance: float, paths: Paths, axis: int, colour: str
                 solid_capstyle="round",
                 zorder=2,
             )
-    if z[0] <= -distance / mm:
-        axes.plot(z[0], heights[:, 0].mean(), "o", color=colour, markersize=5)
+    if paths.z[0] <= -distance:
+        axes.plot(paths.z[0] / mm, heights[:, 0].mean(), "o", color=colour, markersize=5)
 
 
 # --- magnified inset of an array ---

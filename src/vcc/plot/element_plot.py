@@ -10,7 +10,8 @@ import numpy as np
 
 from vcc.base import checks
 from vcc.base.units import mm
-from vcc.optics import CellDeflection, Element, Faces, Louvre
+from vcc.optics import CellDeflection, Element, Faces, Louvre, RealLens
+from vcc.optics.real_rays import entrance_box
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plot import style
@@ -53,8 +54,11 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     checks.one_of("across", across, "xy")
     axis = "xy".index(across)
     element = replace(element, z=0.0, decentre=(0.0, 0.0))
+    if isinstance(element, RealLens):
+        element = replace(element, front=0.0)
     half, rays = _part(element, axis)
-    places = np.linspace(-0.97 * half, 0.97 * half, rays)
+    beam = _beam(element, half, axis)
+    places = np.linspace(-0.97 * beam, 0.97 * beam, rays)
     bundle = np.concatenate([fan(places, math.inf, slope, axis) for slope in _slopes(element, axis)])
     paths = _traced(element, bundle, half, axis)
     end = float(paths.z[-1])
@@ -69,7 +73,7 @@ def plot_element(element: Element, *, across: str = "x", axes: Axes | None = Non
     positions = paths.positions.copy()  # light arrives along straight lines, however far before it is drawn from
     arriving = (positions[:, 1] - positions[:, 0]) / (paths.z[1] - paths.z[0])
     positions[:, 0] = positions[:, 1] - arriving * before
-    paths = replace(paths, z=np.where(paths.z < 0, -before, paths.z), positions=positions)
+    paths = replace(paths, z=np.array([-before, *paths.z[1:]]), positions=positions)
     draw_paths(axes, math.inf, paths, axis, style.BLUE)
     draw_element(pen, element, half)
     style.tidy(axes, "z from the element [mm]", f"{across} [mm]")
@@ -87,6 +91,14 @@ def _part(element: Element, axis: int) -> tuple[float, int]:
         return min(half, CELLS * cells.lattice.pitch / 2), RAYS_A_CELL * CELLS
     scatters = any(part.spread is not None for part in faces)
     return half if math.isfinite(half) else UNBOUNDED, RAYS_THAT_SPLIT if scatters else RAYS
+
+
+def _beam(element: Element, half: float, axis: int) -> float:
+    """Half the height of the light, metres: that which a real lens lets pass, or that of the drawing."""
+    if not isinstance(element, RealLens):
+        return half
+    train = Train([element], Sensor(z=element.length, shape=(1, 1), pitch=1.0))
+    return float(entrance_box(train, math.inf, np.zeros(2))[1][axis])
 
 
 def _slopes(element: Element, axis: int) -> tuple[float, ...]:

@@ -17,14 +17,17 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.optics import (
     CellDeflection,
+    Deflection,
     Element,
     Faces,
     FirstOrder,
     Lens,
     Louvre,
     Prism,
+    RealLens,
     Scatter,
 )
+from vcc.optics.refraction import Refraction
 from vcc.optics.sensor import Sensor
 from vcc.plot import style
 from vcc.plot.tracing import Crossing, crossings, spread_along
@@ -102,6 +105,9 @@ def half_size(element: Element, axis: int) -> float:
 
     For a thick element, half the widest beam of distant light that passes one of its openings.
     """
+    if isinstance(element, RealLens):
+        rims = [surface.radius for surface in element.onward if math.isfinite(surface.radius)]
+        return max([*rims, *([element.mask.size[axis] / 2] if element.mask is not None else [])])
     halves = []
     for crossing in crossings(element):
         half = half_opening(crossing.faces, axis)
@@ -124,6 +130,9 @@ def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
         element: what to draw.
         beam: half the height of the rays through it, metres: the drawn size of a thick element with unknown rims.
     """
+    if isinstance(element, RealLens):
+        _draw_real_lens(pen, element, beam)
+        return
     planes = crossings(element)
     if len(planes) > 1 or element.length > 0:
         _draw_block(pen, element, planes, beam)
@@ -135,6 +144,42 @@ def draw_element(pen: Pen, element: Element, beam: float = 0.0) -> None:
         _draw_louvre(pen, element)
     else:
         _draw_by_faces(pen, element, planes[0].faces)
+
+
+def _draw_real_lens(pen: Pen, lens: RealLens, beam: float) -> None:
+    """The glass between the surfaces of a real lens, and its stop as two blades.
+
+    Surfaces without a clear diameter are drawn as far as the drawn rays reach.
+    """
+    centre, unknown = lens.decentre[pen.axis], 1.05 * beam or half_size(lens, pen.axis)
+    arcs, z = [], lens.z
+    for surface in lens.onward:
+        z += surface.distance
+        half = min(surface.radius if math.isfinite(surface.radius) else unknown, _widest_sag(surface))
+        height = np.linspace(-half, half, 121)
+        arcs.append((z + surface.sag(height**2)[0], height))
+    for number, (index, (front, low), (back, high)) in enumerate(
+        zip((each.index for each in lens.prescription.surfaces), arcs, arcs[1:], strict=False)
+    ):
+        if index == 1:
+            continue
+        edge = max(low[-1], high[-1])  # the smaller of both sides is flat beyond its clear diameter
+        depths = np.concatenate([front, [front[-1], back[-1]], back[::-1], [back[0], front[0]]])
+        heights = np.concatenate([low, [edge, edge], high[::-1], [-edge, -edge]])
+        bounded = all(math.isfinite(each.radius) for each in lens.onward[number : number + 2])
+        pen.glass(depths, heights + centre, bounded)
+    place = lens.stop_number
+    assert place is not None
+    half = lens.mask.size[pen.axis] / 2 if lens.mask is not None else lens.onward[place].radius
+    if math.isfinite(half):
+        beside = [heights[-1] for _, heights in arcs[max(place - 1, 0) : place + 2]]
+        _draw_stop(pen, float(arcs[place][0][-1]), centre, half, max(1.4 * half, *beside))
+
+
+def _widest_sag(surface: Refraction) -> float:
+    """The radius up to which a surface is drawn: nearly that where a sphere is vertical."""
+    square = (1 + surface.conic) * surface.curvature**2
+    return 0.999 / math.sqrt(square) if square > 0 else math.inf
 
 
 def _draw_lens(pen: Pen, lens: Lens) -> None:
@@ -324,7 +369,7 @@ def _profile(faces: Faces, axis: int, places: Array) -> Array:
     if faces.affine is not None:
         slopes = faces.affine(np.stack([x, y, 0 * x, 0 * x], axis=-1))[:, 2 + axis]
     else:
-        assert faces.bending is not None
+        assert isinstance(faces.bending, Deflection)
         slopes = np.asarray(faces.bending(x, y)[axis])
     path = np.concatenate([[0.0], np.cumsum(np.diff(places) * slopes)])
     path -= path.min()

@@ -10,9 +10,11 @@ import numpy as np
 
 from vcc.base import checks
 from vcc.base.affine import Affine
+from vcc.base.errors import InputError
 from vcc.base.units import mm, short
 from vcc.fields.samples import InMemory
-from vcc.optics import CellDeflection, Element, FirstOrder, Lens
+from vcc.optics import CellDeflection, Element, FirstOrder, Lens, RealLens
+from vcc.optics.real_rays import entrance_box
 from vcc.optics.train import Stage, Train
 from vcc.plot.elements import half_size
 from vcc.plot.tracing import Paths, fan, openings, trace
@@ -149,7 +151,8 @@ def scene_length(camera: Train, points: Sequence[Point]) -> float:
     """Length of the scene's side to draw, metres: a fixed part, or up to points that are close."""
     shown = SCENE_SHARE * (camera.sensor.z or 10 * mm)
     near = [point.distance for point in points if point.distance < 2.5 * shown]
-    return max([shown, *(1.08 * distance for distance in near)])
+    glass = [-1.3 * (element.z + element.front) for element in camera.elements if isinstance(element, RealLens)]
+    return max([shown, *glass, *(1.08 * distance for distance in near)])
 
 
 def trace_point(
@@ -179,6 +182,16 @@ def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: i
     """The range on the entrance plane that the rays of a point fill, metres."""
     if light_field is not None:
         return _through_views(point, light_field, axis)
+    if any(isinstance(element, RealLens) for element in camera.elements):
+        field = np.zeros(2)
+        field[axis] = point.offset
+        try:
+            box = entrance_box(camera, point.distance, field)
+        except InputError:  # no light of this point passes
+            half = camera.sensor.size[1 - axis] / 3
+            return -half, half
+        middle, half = (box[1][axis] + box[0][axis]) / 2, (box[1][axis] - box[0][axis]) / 2
+        return float(middle - 0.97 * half), float(middle + 0.97 * half)
     found = list(openings(camera, axis))
     lenses = [one for one in found if isinstance(one[0], Lens | FirstOrder)]
     # A lens's rim is more characteristic than a mask's border; for a thick lens all rims count.
@@ -231,7 +244,8 @@ def beam_at(element: Element, paths: Sequence[Paths], axis: int) -> float:
     """Half the height of the drawn rays, relative to an element's centre, metres."""
     highest = 0.0
     for path in paths:
-        inside = (path.z >= element.z) & (path.z <= element.z + element.length) & (path.z < path.z[-1])
+        front = element.z + min(element.front, 0.0) if isinstance(element, RealLens) else element.z
+        inside = (path.z >= front) & (path.z <= element.z + element.length) & (path.z < path.z[-1])
         heights = np.abs(path.positions[:, inside, axis] - element.decentre[axis])
         highest = max(highest, float(np.where(path.shares[:, inside] > 0, heights, 0.0).max(initial=0.0)))
     return highest

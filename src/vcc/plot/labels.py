@@ -22,6 +22,7 @@ from vcc.optics import (
     Prism,
     PrismArray,
     Pyramid,
+    RealLens,
 )
 from vcc.optics.train import Train
 from vcc.plot import style
@@ -43,7 +44,7 @@ def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
     sensor = camera.sensor
     rows, columns = sensor.shape
     pitch = length_in_words(sensor.pitches[1 - pen.axis])
-    things = [(element.z + element.length / 2, label_of(element, pen)) for element in camera.elements]
+    things = [(_middle(element), label_of(element, pen)) for element in camera.elements]
     things.append((sensor.z, f"sensor\n{rows} × {columns}, {pitch}"))
     frame = pen.axes.get_xaxis_transform()
     labels = [
@@ -82,6 +83,13 @@ def draw_labels(pen: Pen, camera: Train, own_figure: bool) -> None:
         widths = [(Text.get_window_extent(label).width + LABEL_GAP) * millimetres for label in labels]
         for label, place in zip(labels, spread([label.xy[0] for label in labels], widths), strict=True):
             label.set_position((place, 1.07))
+
+
+def _middle(element: Element) -> float:
+    """Where the middle of an element is on the axis, metres."""
+    if isinstance(element, RealLens):
+        return element.z + element.front + element.prescription.length / 2
+    return element.z + element.length / 2
 
 
 def spread(wanted: Sequence[float], widths: Sequence[float]) -> list[float]:
@@ -203,4 +211,5 @@ _WORDS: dict[type[Any], Callable[[Any, Span], list[str]]] = {
     Diffuser: _scatter_words,
     CodedDiffuser: _scatter_words,
     FirstOrder: _system_words,
+    RealLens: lambda lens, pen: _system_words(lens.first_order, pen),
 }

@@ -23,6 +23,7 @@ from vcc.base.errors import InputError
 from vcc.fields.sampled import LIGHT_FIELD_AXES, to_numpy
 from vcc.fields.samples import InMemory
 from vcc.optics import Scatter
+from vcc.optics.aberrations import Aberrations
 from vcc.optics.train import Stage, Train, about, met_in_order
 from vcc.plot.tracing import marginals
 
@@ -232,9 +233,24 @@ class _Bundle:
         for term in stage.faces.terms:
             share = term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
             self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
-        self.rays = stage.deflected(self.rays)
+        if isinstance(stage.faces.bending, Aberrations):
+            self._refract(stage)
+        else:
+            self.rays = stage.deflected(self.rays)
         if stage.faces.spread is not None:
             self._scatter(stage, stage.faces.spread, count)
+
+    def _refract(self, stage: Stage) -> None:
+        """Leave out rays that the surfaces of a real lens stop."""
+        bending = stage.faces.bending
+        assert isinstance(bending, Aberrations)
+        share = bending.shares(self.rays - [*stage.element.decentre, 0.0, 0.0])
+        kept = share > 0
+        if not kept.any():
+            raise InputError(f"no ray of this slice passes {stage.element.label}")
+        share = share[kept] if self.radiance.ndim == 1 else share[kept, None]
+        self.radiance = self.radiance[kept] * share
+        self.rays = stage.deflected(self.rays[kept])
 
     def laid_out(self, columns: int, rows: int, grow: float = 0.0) -> tuple[Array, Array, Array, Array]:
         """(radiance, filled, borders of columns, borders of rows), the second coordinate extended by ``grow``."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
-from vcc.optics import Element, Faces, Scatter
+from vcc.optics import Element, Faces, RealLens, Scatter
 from vcc.optics.faces import Part
 from vcc.optics.train import Stage, Train, about, met_in_order
 from vcc.shapes.kernels import Kernel
@@ -37,12 +37,19 @@ class Paths(Brief):
         shares: remaining light of each ray on arrival at each plane, 0 to 1: (rays, planes).
         starts: the plane at which each ray begins, (rays,): 0, or that of the diffuser at which it branched off.
             Before that, it coincides with the ray from which it branched off.
+        behind: how far behind each plane's z a ray meets a curved surface of a real lens, metres: (rays, planes).
     """
 
     z: Array
     positions: Array
     shares: Array
     starts: NDArray[np.int64]
+    behind: Array
+
+    @property
+    def depths(self) -> Array:
+        """Where on the axis each ray meets each plane or surface, metres: (rays, planes)."""
+        return self.z + self.behind
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +108,15 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
         InputError: an element with an invalid result.
     """
     given = np.asarray(rays, dtype=np.float64)
-    bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [])
+    bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [], [])
     bundle.cross(start, Affine.propagation(start)(given)[:, :2])
     here = 0.0
     for element, parts in met_in_order(camera.elements):
         bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
         here = element.z + element.length
+        if isinstance(element, RealLens):
+            bundle.refract(element)
+            continue
         for crossing in crossings(element, parts):
             bundle.rays = about(element.decentre, crossing.step)(bundle.rays)
             bundle.cross(crossing.z, bundle.rays[:, :2])
@@ -114,7 +124,11 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
     bundle.rays = Affine.propagation(camera.sensor.z - here)(bundle.rays)
     bundle.cross(camera.sensor.z, bundle.rays[:, :2])
     return Paths(
-        np.array(bundle.z), np.stack(bundle.positions, axis=1), np.stack(bundle.shares, axis=1), bundle.starts
+        np.array(bundle.z),
+        np.stack(bundle.positions, axis=1),
+        np.stack(bundle.shares, axis=1),
+        bundle.starts,
+        np.stack(bundle.behind, axis=1),
     )
 
 
@@ -128,12 +142,41 @@ class _Bundle:
     z: list[float]
     positions: list[Array]
     shares: list[Array]
+    behind: list[Array]
 
-    def cross(self, z: float, positions: Array) -> None:
-        """Record the arrival of the rays at a plane."""
+    def cross(self, z: float, positions: Array, behind: Array | None = None) -> None:
+        """Record the arrival of the rays at a plane, or so far behind it."""
         self.z.append(z)
         self.positions.append(positions)
         self.shares.append(self.share)
+        self.behind.append(np.zeros(len(positions)) if behind is None else behind)
+
+    def refract(self, lens: RealLens) -> None:
+        """Refract the rays at each surface of a real lens, from its z to its end. Rays that miss one end."""
+        middle, z = [*lens.decentre, 0.0, 0.0], lens.z
+        x, y, s, t = (self.rays - middle).T
+        for number, surface in enumerate(lens.onward):
+            z += surface.distance
+            with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+                met = surface.met(x, y, s, t)
+            hit = np.isfinite(met.x) & np.isfinite(met.z)
+            plane = x + surface.distance * s, y + surface.distance * t
+            places = np.column_stack(
+                [np.where(hit, on, off) for on, off in zip((met.x, met.y), plane, strict=True)]
+            )
+            self.share = np.where(hit, self.share, 0.0)
+            self.cross(z, places + lens.decentre, np.where(hit, met.z, 0.0))
+            self.share = self.share * surface.share(met)
+            if lens.mask is not None and number == lens.stop_number:
+                self.share = self.share * lens.mask(*places.T)
+            going = self.share > 0
+            x, y = (
+                np.where(going, at - slope * met.z, on)
+                for at, slope, on in zip((met.x, met.y), (met.s, met.t), places.T, strict=True)
+            )
+            s, t = np.where(going, met.s, 0.0), np.where(going, met.t, 0.0)
+        ending = lens.z + lens.length - z
+        self.rays = np.column_stack([x + ending * s, y + ending * t, s, t]) + middle
 
     def meet(self, stage: Stage, split_along: int | None) -> None:
         """Absorb, bend and scatter the rays."""
@@ -161,6 +204,7 @@ class _Bundle:
         self.rays[:, 2 + axis] += slopes.ravel()
         self.positions = [positions[parent] for positions in self.positions]
         self.shares = [shares[parent] for shares in self.shares]
+        self.behind = [behind[parent] for behind in self.behind]
         # The middle branch continues the original ray.
         own = np.arange(count * branch) % branch == middle
         self.starts = np.where(own, self.starts[parent], len(self.z) - 1)
