@@ -47,7 +47,7 @@ class RealLens(Element):
         mask: transmission in the plane of the stop, in place of the round opening; the stop must be a flat surface
             in air.
         front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
-        dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
+        dispersion: whether each band of light has its own indices, where the prescription names glasses.
         radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as
             behind thin lenses, without the fall-off cos⁴θ.
         transmission: share of light that each surface transmits: a number for all, or one for each surface.

@@ -122,8 +122,8 @@ def rays_from(distance: float, field: Any, places: Array) -> Array:
 def light_stages(train: Train) -> list[Stage]:
     """The stages that light meets, with the windows of real lenses open.
 
-    A window is a disc behind a lens that rays are aimed at. Light that passes beside it misses the sensor, and points
-    whose image is outside the sensor are analysed all the same.
+    A window is a disc behind a lens that rays are aimed at. Light that passes beside it misses the sensor, and
+    points whose image is outside the sensor are analysed all the same.
 
     Args:
         train: the camera.
