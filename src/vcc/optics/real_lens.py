@@ -47,7 +47,7 @@ class RealLens(Element):
         mask: transmission in the plane of the stop, in place of the round opening; the stop must be a flat surface
             in air.
         front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
-        dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
+        dispersion: whether each band of light has its own indices, where the prescription names glasses.
         radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as
             behind thin lenses, without the fall-off cos⁴θ.
         transmission: share of light that each surface transmits: a number for all, or one for each surface.
@@ -137,7 +137,7 @@ class RealLens(Element):
         checks.one_of("z_of", z_of, get_args(Reference))
         opening, front = prescription.opening(stop_diameter, f_number), 0.0
         if z_of == "entrance pupil":
-            pupil = prescription.first_order(stop_diameter=opening).entrance_pupil.distance
+            pupil = prescription.opened(opening).first_order().entrance_pupil.distance
             if math.isinf(pupil):
                 raise InputError("the entrance pupil lies at infinity: place the lens by its first surface")
             front = -pupil
@@ -149,7 +149,7 @@ class RealLens(Element):
     @cached
     def first_order(self) -> FirstOrder:
         """The lens without aberrations: focal length, principal planes, pupils, image distance."""
-        lens = self.prescription.first_order(z=self.z, stop_diameter=self.stop_diameter, decentre=self.decentre)
+        lens = self.prescription.opened(self.stop_diameter).first_order(z=self.z, decentre=self.decentre)
         to_first, behind = Affine.propagation(self.front), Affine.propagation(self._behind)
         matrix = (behind @ lens.affine @ to_first).linear[0:4:2, 0:4:2]
         stop = lens.stop_from_entrance

@@ -409,7 +409,7 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
     else:
         matrix = lens.prescription.stop_from_entrance
         pupil = (
-            lens.prescription.first_order(stop_diameter=lens.stop_diameter).entrance_pupil
+            lens.prescription.opened(lens.stop_diameter).first_order().entrance_pupil
             if matrix is not None
             else None
         )
