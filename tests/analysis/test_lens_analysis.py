@@ -204,7 +204,7 @@ def test_best_focus_of_spherical_aberration_is_two_thirds_of_the_way() -> None:
     assert camera.focused_at(FAR).sensor.z == pytest.approx(camera.sensor.z, abs=1e-12)
     sharp = analysis.best_focus(camera, FAR, by="mtf", frequency=20e3)
     assert camera.focused_at(FAR, by="mtf", frequency=20e3).sensor.z == pytest.approx(sharp.z, abs=1e-9)
-    steps = np.linspace(-3, 3, 13) * abs(found.shift)
+    steps = np.linspace(-3, 3, 7) * abs(found.shift)
     cameras = [dataclasses.replace(camera.sensor, z=camera.sensor.z + sharp.shift + step) for step in steps]
     contrast = [
         analysis.mtf_over_field(
@@ -281,7 +281,8 @@ def test_what_has_no_answer_is_refused(gauss: vcc.Camera) -> None:
 def test_results_draw_and_describe_themselves(name: str) -> None:
     lens = vcc.load_lens("achromat-100mm", model="real")
     camera = vcc.Camera.focused([lens], vcc.Sensor(z=0, shape=(100, 100), pitch=40 * um), FAR)
-    found = getattr(analysis, name)(camera)
+    few = {"fields": [0.0, 1.0]} if name in ("relative_illumination", "mtf_over_field", "psf_over_field") else {}
+    found = getattr(analysis, name)(camera, **few)
     drawn = found.plot()
     assert (drawn if hasattr(drawn, "savefig") else drawn.figure).axes
     assert repr(found).startswith(type(found).__name__)

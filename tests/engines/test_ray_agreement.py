@@ -17,6 +17,7 @@ import torch
 import vcc
 from vcc.base.units import mm
 from vcc.optics import Element, Faces, Lattice
+from vcc.optics.prescription import Prescription, Surface
 from vcc.plan.rays.bounds.windows import CellWindows, Window
 from vcc.run.drive import drive
 from vcc.shapes import kernels, patterns, surfaces
@@ -102,6 +103,24 @@ ELEMENTS = {
     ],
     "gaps": [Gaps(z=20 * mm)],
     "thick": [vcc.FirstOrder.thick_lens((60 * mm, -50 * mm), 4 * mm, 1.5, z=2 * mm, decentre=(0.3 * mm, 0))],
+    "real lens": [
+        vcc.RealLens.of(
+            Prescription(
+                (
+                    Surface(70 * mm, 1 * mm, 1.6, 7 * mm, conic=-0.4, aspheres=(1e3,)),
+                    Surface(300 * mm, 0.5 * mm, 1.0),
+                    Surface(np.inf, 0.5 * mm, 1.0, 5 * mm, True),
+                    Surface(-90 * mm, 1 * mm, 1.5),
+                    Surface(-60 * mm, 0.0, 1.0, 7 * mm),
+                )
+            ),
+            z=2 * mm,
+            decentre=(0.2 * mm, 0.0),
+            mask=patterns.Polygon(5, 5 * mm),
+            fresnel=True,
+        ),
+        vcc.Mask(RANDOM.random((4, 5)), z=20 * mm, width=9 * mm),
+    ],
     "mixing x and y": [vcc.FirstOrder(_turn := np.kron(np.eye(2), [[0.8, -0.6], [0.6, 0.8]]), 1 * mm, z=3 * mm)],
 }
 

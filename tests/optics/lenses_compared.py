@@ -17,7 +17,7 @@ Row = tuple[float, ...]
 
 LENSES: dict[str, dict[str, Any]] = {
     # (radius, thickness, index behind, conic, r⁴, r⁶), the stop's number, the entrance pupil's diameter, a field
-    "singlet": {  # stop on its second surface; Zemax's figures: Optiland issue 710
+    "singlet": {  # stop on its second surface; figures of OpticStudio: Optiland, validation report 710
         "rows": [(63.73364157, 10.0, 1.69099596), (653.2939232, 92.7383463, 1.0)],
         "stop": 1, "pupil": 25.0, "angle": 5.0,
     },

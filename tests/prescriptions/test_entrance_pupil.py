@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 
 import vcc
+from vcc.prescriptions import read_prescription
 from vcc.units import mm, um
 
 # Two menisci about a stop; millimetres: radius (0 is the stop), gap behind, index behind, diameter.
@@ -159,3 +161,14 @@ def test_rims_would_move(table):
         vcc.load_lens(table, rims=True, z_of="entrance pupil")
     with pytest.raises(vcc.InputError, match=r"z_of is 'first surface' or 'entrance pupil', not 'pupil'"):
         vcc.load_lens(table, z_of="pupil")
+
+
+def test_a_real_lens_of_another_colour_keeps_its_stop(recwarn):
+    """An f-number at the design wavelength fixes the stop; its rims are simulated, so nothing is warned of."""
+    lens = dataclasses.replace(read_prescription("triplet-100mm"), f_number=4.4, entrance_pupil_diameter=None)
+    real = vcc.RealLens.of(lens, z_of="entrance pupil")
+    camera = vcc.Camera.focused([real], vcc.Sensor(z=0, shape=(10, 10), pitch=1e-3), 3.0)
+    blue = camera.at_wavelength(450e-9).elements[0]
+    assert blue.first_order.stop_diameter == pytest.approx(real.first_order.stop_diameter, rel=1e-12)
+    assert real.f_number == pytest.approx(4.4)
+    assert not recwarn

@@ -13,15 +13,13 @@ from vcc.base.units import short
 from vcc.optics.real_lens import RealLens
 from vcc.optics.real_rays import (
     Bundle,
-    Fields,
     bands_of,
     bundle,
-    chief_rays,
     fields_of,
     half_diagonal,
+    image_scale,
     irradiance,
     sharpest_shift,
-    to_sensor,
 )
 from vcc.optics.train import Train
 
@@ -31,8 +29,6 @@ SIDE = 32
 """Rays along each side of the box around a point's light."""
 FINE = 0.5
 """A spot whose root mean square diameter is below this share of a pixel does not show."""
-NEAR_AXIS = 1e-4
-"""Slope of the point that measures the scale of the image."""
 
 
 def lens_section(train: Train, wavelengths: Sequence[float] | None) -> str:
@@ -86,7 +82,8 @@ def _of_field(trains: Sequence[Train], distance: float, share: float, name: str)
         lines.append(
             f"{name}, rims hide {hidden:.0%} of the stop; irradiance is {here[0] / there[0]:.0%} of the middle's"
         )
-    bend = _distortion(reference, distance, fields)
+    scale, centre = image_scale(reference, distance, np.array([1.0, 0.0]))
+    bend = float((fields.heights[0] - centre) / (scale * fields.slopes[0, 0])) - 1
     return [*lines, f"{name}, distortion is {round(bend, 4) + 0.0:+.2%}"]
 
 
@@ -131,13 +128,3 @@ def _parts(one: Bundle) -> list[float]:
         part = part - (weight**2).T @ part
         parts.append(float(np.sqrt((weight**2 * part**2).sum())))
     return parts
-
-
-def _distortion(train: Train, distance: float, fields: Fields) -> float:
-    """Height of the chief ray over that in proportion to tan θ, less 1."""
-    ends, _ = to_sensor(
-        train, chief_rays(train, distance, slopes=np.array([[-NEAR_AXIS, 0.0], [NEAR_AXIS, 0.0]])), rims=False
-    )
-    scale = float(ends[1, 0] - ends[0, 0]) / (2 * NEAR_AXIS)
-    centre = float(ends[:, 0].mean()) - train.sensor.decentre[0]
-    return float((fields.heights[0] - centre) / (scale * fields.slopes[0, 0]) - 1)

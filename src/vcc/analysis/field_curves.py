@@ -25,7 +25,17 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.showing import Shown
 from vcc.optics import Element
-from vcc.optics.real_rays import SIDE, bundle, chief_rays, half_diagonal, irradiance, sharpest_shift, to_sensor
+from vcc.optics.real_rays import (
+    NEAR_AXIS,
+    SIDE,
+    bundle,
+    chief_rays,
+    half_diagonal,
+    image_scale,
+    irradiance,
+    sharpest_shift,
+    to_sensor,
+)
 from vcc.optics.train import Train
 from vcc.plot import style
 
@@ -36,8 +46,6 @@ Array = NDArray[np.float64]
 
 NEXT = 1e-5
 """Distance from the chief ray of the rays that focus with it, metres on the entrance plane."""
-NEAR_AXIS = 1e-4
-"""Slope from the axis of the point that measures the scale of the image."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,13 +179,10 @@ def distortion(
     """
     at = prepared(camera, distance, fields, angles, wavelengths, across, CURVE)
     train, along = at.trains[at.reference], np.eye(2)["xy".index(across)]
-    ends, _ = to_sensor(
-        train, chief_rays(train, at.distance, slopes=np.outer([-NEAR_AXIS, 0.0, NEAR_AXIS], along)), rims=False
-    )
-    scale = float((ends[2, :2] - ends[0, :2]) @ along) / (2 * NEAR_AXIS)
+    scale, centre = image_scale(train, at.distance, along)
     ideal = scale * (at.fields.slopes @ along)
-    heights = at.fields.heights - float((ends[1, :2] - train.sensor.decentre) @ along)
-    share = np.divide(heights, ideal, out=np.ones_like(ideal), where=np.abs(ideal) > abs(scale) * NEAR_AXIS) - 1
+    seen = np.abs(ideal) > abs(scale) * NEAR_AXIS
+    share = np.divide(at.fields.heights - centre, ideal, out=np.ones_like(ideal), where=seen) - 1
     return Distortion(at, ideal, share)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics import Scatter
-from vcc.optics.real_rays import entrance_box, rays_from, to_sensor
+from vcc.optics.real_rays import entrance_box, light_stages, rays_from, to_sensor
 from vcc.optics.train import Stage, Train
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ class PointRays:
         """
         rays = np.stack([self.from_places(places + near * beside) for beside in ((0, 0), (1, 0), (0, 1))])
         share, lost = np.ones(len(places)), np.zeros(len(places), dtype=bool)
-        for stage in self.camera.stages:
+        for stage in light_stages(self.camera):
             rays = stage.approach(rays)
             if stage.faces.pattern is not None:
                 share = share * _mean_transmission(stage, rays)
@@ -154,7 +154,7 @@ class PointRays:
         """
         from scipy.stats import qmc
 
-        stages = self.camera.stages
+        stages = light_stages(self.camera)
         spreads = [stage.faces.spread for stage in stages if stage.faces.spread is not None]
         dimensions = 2 + sum(2 + (len(spread.kernels) > 1) for spread in spreads)
         power = math.ceil(math.log2(rays))

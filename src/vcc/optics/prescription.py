@@ -292,6 +292,17 @@ class Prescription(Brief):
             )
         return opening
 
+    def opened(self, diameter: float | None) -> Prescription:
+        """The lens with a stop of this diameter, metres, whatever aperture the file states; None leaves it.
+
+        Args:
+            diameter: metres.
+        """
+        if diameter is None:
+            return self
+        surfaces = (dataclasses.replace(each, diameter=diameter) if each.stop else each for each in self.surfaces)
+        return dataclasses.replace(self, surfaces=tuple(surfaces), f_number=None, entrance_pupil_diameter=None)
+
     def opening(self, stop_diameter: float | None = None, f_number: float | None = None) -> float | None:
         """The diameter of the stop, metres: the requested one, else the file's aperture, else its own diameter.
 

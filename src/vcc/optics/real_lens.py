@@ -47,7 +47,7 @@ class RealLens(Element):
         mask: transmission in the plane of the stop, in place of the round opening; the stop must be a flat surface
             in air.
         front: distance from z to the vertex of the first surface, metres; negative if glass stands before z.
-        dispersion: whether each band of light has its own indices, where the prescription knows its glasses.
+        dispersion: whether each band of light has its own indices, where the prescription names glasses.
         radiometry: ``"exact"``: the irradiance behind the lens is ∫ L cosθ dω; ``"paraxial"``: ∫ L ds dt, as
             behind thin lenses, without the fall-off cos⁴θ.
         transmission: share of light that each surface transmits: a number for all, or one for each surface.
@@ -137,7 +137,7 @@ class RealLens(Element):
         checks.one_of("z_of", z_of, get_args(Reference))
         opening, front = prescription.opening(stop_diameter, f_number), 0.0
         if z_of == "entrance pupil":
-            pupil = prescription.first_order(stop_diameter=opening).entrance_pupil.distance
+            pupil = prescription.opened(opening).first_order().entrance_pupil.distance
             if math.isinf(pupil):
                 raise InputError("the entrance pupil lies at infinity: place the lens by its first surface")
             front = -pupil
@@ -149,7 +149,7 @@ class RealLens(Element):
     @cached
     def first_order(self) -> FirstOrder:
         """The lens without aberrations: focal length, principal planes, pupils, image distance."""
-        lens = self.prescription.first_order(z=self.z, stop_diameter=self.stop_diameter, decentre=self.decentre)
+        lens = self.prescription.opened(self.stop_diameter).first_order(z=self.z, decentre=self.decentre)
         to_first, behind = Affine.propagation(self.front), Affine.propagation(self._behind)
         matrix = (behind @ lens.affine @ to_first).linear[0:4:2, 0:4:2]
         stop = lens.stop_from_entrance
@@ -260,20 +260,16 @@ class RealLens(Element):
         """
         distance = self._pupil_distance
         widest = None if seen is None else self._widest_seen(distance, seen)
-        radius = self.exit_window[1] if widest is None else _rounded_up(widest)
-        disc = Faces(transmission=Circle(2 * radius))
+        if widest is None:
+            widest = self._widest(distance)
+        steps = math.ceil(math.log(widest) / math.log1p(PUPIL_STEP) + 0.5)
+        disc = Faces(transmission=Circle(2 * (1 + PUPIL_STEP) ** steps))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
 
     def faces(self) -> Faces:
         """No faces: the effect of a thick element is between its planes; see `parts`."""
         return Faces()
-
-    @property
-    @cached
-    def exit_window(self) -> tuple[float, float]:
-        """(distance from the end of the element, radius) of a disc that all light leaving passes, metres."""
-        return self._pupil_distance, _rounded_up(self._widest(self._pupil_distance))
 
     @property
     @cached
@@ -426,11 +422,6 @@ def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float
         near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
         points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
     return float(away.max())
-
-
-def _rounded_up(radius: float) -> float:
-    """The next power of 1 + PUPIL_STEP, half a step or more above a radius, metres."""
-    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 0.5))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:

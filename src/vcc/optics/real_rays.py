@@ -22,6 +22,7 @@ from vcc.base.wavelengths import wavelength as checked_wavelength
 from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
 from vcc.optics.bands import single_way
+from vcc.optics.faces import Faces
 from vcc.optics.real_lens import RealLens
 from vcc.optics.refraction import traced
 from vcc.optics.train import Stage, Train
@@ -36,6 +37,8 @@ SEARCHED = 65
 """Rays per side in the search for the light of a point; odd, so that one is in the middle."""
 ROUNDS = 12
 """Most rounds of this search: the box grows, or shrinks onto the light."""
+NEAR_AXIS = 1e-4
+"""Slope from the axis of the points that measure the scale of the image."""
 STEPS, ITERATIONS = 12, 5
 """Steps from the axis to a field on which chief rays are followed, and Newton's iterations in each."""
 SPECTRUM = (486.1327e-9, 587.5618e-9, 656.2725e-9)
@@ -49,7 +52,7 @@ class Bundle(Brief):
     Args:
         places: (n, 2) on the sensor, metres.
         slopes: (n, 2) there.
-        light: (n,): what each ray carries; the sum is the light of the point through 1 m² of the entrance plane.
+        light: (n,): the area of the entrance plane that each ray stands for, times its share of light, m².
         stop: (n, 2): places in the stop, in units of its radius.
     """
 
@@ -118,6 +121,23 @@ def rays_from(distance: float, field: Any, places: Array) -> Array:
 # --- through the camera
 
 
+def light_stages(train: Train) -> list[Stage]:
+    """The stages that light meets, with the windows of real lenses open.
+
+    A window is a disc behind a lens that rays are aimed at. Light that passes beside it misses the sensor, but
+    points may be analysed whose image is outside the sensor.
+
+    Args:
+        train: the camera.
+    """
+    found = list(train.stages)
+    for number, stage in enumerate(found):
+        last = number + 1 == len(found) or found[number + 1].element is not stage.element
+        if isinstance(stage.element, RealLens) and stage.faces.bending is None and last:
+            found[number] = replace(stage, faces=Faces())
+    return found
+
+
 def to_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Array]:
     """Rays (..., 4) of the entrance plane at the sensor, and their light (...), 0 where they are stopped.
 
@@ -128,7 +148,7 @@ def to_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Arra
             geometry of chief rays. Rays that miss a surface become NaN.
     """
     light = np.ones(rays.shape[:-1])
-    for stage in train.stages:
+    for stage in light_stages(train):
         rays = stage.approach(rays)
         if rims:
             light = light * _transmission(stage, rays)
@@ -168,7 +188,7 @@ def from_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Ar
         rims: False: without clear diameters and masks, as in `to_sensor`; rays that miss a surface become NaN.
     """
     share, onward = np.ones(rays.shape[:-1]), train.approach_to_sensor
-    for stage in reversed(train.stages):
+    for stage in reversed(light_stages(train)):
         rays = onward.inverse()(rays)
         onward, bending = stage.approach, stage.faces.bending
         middle = [*stage.element.decentre, 0.0, 0.0]
@@ -213,9 +233,9 @@ class Stop(Brief):
             lens = stage.element
             if isinstance(lens, RealLens) and isinstance(stage.faces.bending, Aberrations):
                 if lens.mask is not None:
-                    return cls(number + 1, 0, max(lens.mask.size) / 2)
+                    return cls(number + 1, 0, _stop_radius(lens))
                 assert lens.stop_number is not None
-                return cls(number, lens.stop_number + 1, lens.onward[lens.stop_number].radius)
+                return cls(number, lens.stop_number + 1, _stop_radius(lens))
         best, found = math.inf, cls(0, 0, math.inf)
         for number, stage in enumerate(train.stages):
             if stage.faces.bending is not None:
@@ -327,7 +347,7 @@ def entrance_box(train: Train, distance: float, field: Any) -> Box:
             lambda places: _passes(train, rays_from(distance, field, places)),
             _into_lens(lens, distance, field, (low, high)),
             bounded=math.isfinite(bending.onward[0].radius),
-            connected=any(each.radius == math.inf and each.ratio != 1 for each in bending.onward),
+            connected=_lacks_rims(bending),
         )
         if box is None:
             raise InputError(
@@ -367,6 +387,12 @@ def _entrance_from(arriving: Affine, distance: float, field: Any) -> Affine | No
     return there.inverse() if there.is_invertible() else None
 
 
+def _stop_radius(lens: RealLens) -> float:
+    """Half the size of a real lens's stop, metres."""
+    assert lens.stop_number is not None
+    return max(lens.mask.size) / 2 if lens.mask is not None else lens.onward[lens.stop_number].radius
+
+
 def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
     """Where to search for light through a real lens: its first rim, else four times its entrance pupil."""
     low, high = box
@@ -383,12 +409,12 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
     else:
         matrix = lens.prescription.stop_from_entrance
         pupil = (
-            lens.prescription.first_order(stop_diameter=lens.stop_diameter).entrance_pupil
+            lens.prescription.opened(lens.stop_diameter).first_order().entrance_pupil
             if matrix is not None
             else None
         )
         if pupil is None or math.isinf(pupil.distance):
-            back, reach = _entrance_from(vertex, distance, field), np.full(2, lens.exit_window[1])
+            back, reach = _entrance_from(vertex, distance, field), np.full(2, 4 * _stop_radius(lens))
         else:
             back = _entrance_from(Affine.propagation(pupil.distance) @ vertex, distance, field)
             reach = np.full(2, 2 * pupil.diameter)
@@ -396,6 +422,11 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
         raise InputError(f"the point stands in the plane of {lens.label}: move it away from the lens")
     corners = back(np.array([[x, y] for x in (-1, 1) for y in (-1, 1)]) * reach + lens.decentre)
     return np.maximum(low, corners.min(axis=0)), np.minimum(high, corners.max(axis=0))
+
+
+def _lacks_rims(lens: Aberrations) -> bool:
+    """Whether a surface of glass has no clear diameter."""
+    return any(each.radius == math.inf and each.ratio != 1 for each in lens.onward)
 
 
 def searched(passes: Any, box: Box, bounded: bool = False, connected: bool = False) -> Box | None:
@@ -455,7 +486,7 @@ def midpoints(low: Array, high: Array, counts: tuple[int, int]) -> Array:
 def _passes(train: Train, rays: Array) -> NDArray[np.bool_]:
     """Whether rays pass the rims of real lenses, and the outlines of openings up to what scatters or bends."""
     kept = np.ones(len(rays), dtype=bool)
-    for stage in train.stages:
+    for stage in light_stages(train):
         rays = stage.approach(rays)
         half = np.array(stage.opening) / 2 * (1 + 1e-12)
         kept &= (np.abs(rays[:, :2] - stage.element.decentre) <= half).all(axis=1)
@@ -568,6 +599,19 @@ def fields_of(
     return Fields(slopes, heights, heights / half, seen, chiefs)
 
 
+def image_scale(train: Train, distance: float, along: Array) -> tuple[float, float]:
+    """Heights of chief rays near the axis on the sensor, metres: per slope of the field, and of the axis.
+
+    Args:
+        train: the camera at one wavelength.
+        distance: of the points, metres.
+        along: direction of fields and heights, a unit vector.
+    """
+    chiefs = chief_rays(train, distance, slopes=np.outer([-NEAR_AXIS, NEAR_AXIS], along))
+    ends = (to_sensor(train, chiefs, rims=False)[0][:, :2] - train.sensor.decentre) @ along
+    return float(ends[1] - ends[0]) / (2 * NEAR_AXIS), float(ends.mean())
+
+
 def half_diagonal(train: Train) -> float:
     """Of the sensor, metres."""
     return math.hypot(*train.sensor.size) / 2
@@ -612,7 +656,11 @@ def irradiance(train: Train, place: Any, side: int = 129) -> tuple[float, float]
         onward = onward @ (stage.approach if stage.centred is None else stage.centred @ stage.approach)
     if not (np.isfinite(low).all() and np.isfinite(high).all()):
         raise InputError("nothing bounds the light that reaches the sensor: give the lens a diameter")
-    box = searched(lambda slopes: from_sensor(train, rays(slopes))[1] > 0, (low, high), bounded=True)
+    # A window bounds the light for places on the sensor; others are analysed as well.
+    rimless = any(
+        isinstance(stage.faces.bending, Aberrations) and _lacks_rims(stage.faces.bending) for stage in train.stages
+    )
+    box = searched(lambda slopes: from_sensor(train, rays(slopes))[1] > 0, (low, high), connected=rimless)
     if box is None:
         return 0.0, 0.0
     slopes = midpoints(*box, (side, side))

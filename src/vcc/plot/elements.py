@@ -107,7 +107,7 @@ def half_size(element: Element, axis: int) -> float:
     """
     if isinstance(element, RealLens):
         rims = [surface.radius for surface in element.onward if math.isfinite(surface.radius)]
-        return max(rims, default=element.exit_window[1])
+        return max([*rims, *([element.mask.size[axis] / 2] if element.mask is not None else [])])
     halves = []
     for crossing in crossings(element):
         half = half_opening(crossing.faces, axis)
