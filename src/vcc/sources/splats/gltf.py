@@ -150,7 +150,9 @@ class _Buffers:
 def _splats_of(primitive: dict[str, Any], buffers: _Buffers) -> Splats:
     stated = value_at(primitive, "extensions", EXTENSION)
     if value_at(stated, "extensions"):
-        raise InputError(f"the splats of the glTF are extended by {', '.join(stated['extensions'])}: not supported")
+        raise InputError(
+            f"the splats of the glTF are extended by {', '.join(stated['extensions'])}: not supported"
+        )
     kernel, space = value_at(stated, "kernel"), value_at(stated, "colorSpace")
     if kernel not in (None, "ellipse") or str(space or "srgb_rec709_display") not in _COLOUR_SPACES:
         raise InputError(
@@ -199,7 +201,9 @@ def _placed(splats: Splats, node: dict[str, Any]) -> Splats:
         raise InputError("a node of the glTF has a transform that is not numbers") from None
     factor = float(matrix[0, 0])
     if turned or not factor > 0 or not np.allclose(matrix[:3, :3], factor * np.eye(3), atol=1e-6 * abs(factor)):
-        raise InputError("a node of the glTF rotates or stretches its splats, which is not supported: apply it first")
+        raise InputError(
+            "a node of the glTF rotates or stretches its splats, which is not supported: apply it first"
+        )
     if not math.isfinite(float(np.abs(matrix).sum())):
         raise InputError("a node of the glTF has a transform that is not finite")
     moved = (splats.positions * factor + matrix[:3, 3]).astype(np.float32)

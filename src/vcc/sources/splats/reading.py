@@ -98,7 +98,9 @@ def _read_ply(path: Path) -> Splats:
         )
     wrong = [field for field, kind in fields if field in _NEEDED and kind not in ("f4", "f8")]
     if wrong or len(set(names)) < len(names):
-        raise InputError(f"the PLY has integers, lists or a name twice in its fields ({', '.join(wrong or names)})")
+        raise InputError(
+            f"the PLY has integers, lists or a name twice in its fields ({', '.join(wrong or names)})"
+        )
     layout = np.dtype([(field, order + kind) for field, kind in fields])
     size = path.stat().st_size
     if start + count * layout.itemsize > size:

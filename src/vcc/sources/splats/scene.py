@@ -157,9 +157,7 @@ class SplatScene:
         with Workers(self.threads) as workers:
 
             def shared(work: Any, total: int, step: int) -> None:
-                parts = [
-                    workers.submit(work, first, min(first + step, total)) for first in range(0, total, step)
-                ]
+                parts = [workers.submit(work, first, min(first + step, total)) for first in range(0, total, step)]
                 for part in parts:
                     part.result()
 
