@@ -1,8 +1,8 @@
 """Cameras with positions and directions: transforms.json of NeRF, and cameras.json of 3D Gaussian splatting.
 
 Sources: the documentation of instant-ngp and nerfstudio ("Data conventions"): ``transform_matrix`` maps camera to
-world coordinates, with x right, y up and z backwards; the code release of Kerbl et al. 2023: ``rotation`` maps camera
-to world coordinates, with x right, y down and z forwards, and ``position`` is the centre of the camera.
+world coordinates, with x right, y up and z backwards; the code release of Kerbl et al. 2023: ``rotation`` maps
+camera to world coordinates, with x right, y down and z forwards, and ``position`` is the centre of the camera.
 """
 
 from __future__ import annotations

@@ -26,8 +26,8 @@ DTYPES = ("float16", "float32", "uint8", "uint16")
 class Renderer(Protocol):
     """Renders the image of one view. A renderer that holds resources may also have ``close()``.
 
-    A renderer that knows depth may also have ``disparity_maps(cameras)``, which returns `DisparityMaps`: they become
-    the disparities of the light field.
+    A renderer that computes depth may also have ``disparity_maps(cameras)``, which returns `DisparityMaps`: they
+    become the disparities of the light field.
     """
 
     def description(self) -> dict[str, Any]:

@@ -27,7 +27,7 @@ LARGEST = 1e9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Splats(Brief):
-    """A cloud of 3D Gaussians with colours that depend on the direction (Kerbl et al. 2023), in a scene's own axes.
+    """A cloud of 3D Gaussians with view-dependent colours (Kerbl et al. 2023), in a scene's own axes.
 
     Args:
         positions: centres, scene units, (splats, 3).
@@ -127,7 +127,7 @@ class Splats(Brief):
         """SHA-256 of all numbers, hexadecimal."""
         state = hashlib.sha256(repr((self.harmonics.shape, self.transfer, self.antialiased)).encode())
         for name in ("positions", "sizes", "rotations", "opacities", "harmonics"):
-            state.update(np.ascontiguousarray(getattr(self, name)))
+            state.update(np.ascontiguousarray(getattr(self, name)).data)
         return state.hexdigest()
 
 
@@ -145,4 +145,4 @@ def unit_quaternions(rotations: NDArray[Any]) -> Floats:
             f"{len(bad)} of {len(wide)} splats have no rotation (a quaternion of 0, or not finite), the first is "
             f"splat {int(bad[0])}: {rotations[bad[0]].tolist()}"
         )
-    return (wide / length[:, None]).astype(np.float32)
+    return np.asarray(wide / length[:, None], dtype=np.float32)

@@ -50,7 +50,7 @@ def read_gltf(path: Path) -> Splats:
     if len({(each.degree, each.transfer) for each in found}) > 1:
         raise InputError("the glTF has splats of different degrees or colour spaces: split it")
     names = ("positions", "sizes", "rotations", "opacities", "harmonics")
-    joined = {name: np.concatenate([getattr(each, name) for each in found]) for name in names}
+    joined: Any = {name: np.concatenate([getattr(each, name) for each in found]) for name in names}
     return Splats(**joined, transfer=first.transfer, up=first.up)
 
 

@@ -23,11 +23,11 @@ MOST_ALPHA = 0.99
 DARK = 1e-4
 """Transmittance below which splats behind are not drawn."""
 BEYOND = 0.15
-"""Share of the width of a view, beyond each border, up to which perspective is linearised at a splat's own place."""
+"""Share of the width of a view, beyond each border, up to which perspective is linearised at a splat's place."""
 
 RECORD = 15
-"""Numbers of a projected splat: column, row, the upper triangle of the inverse covariance (3), opacity, logarithm of
-the least share of it that is drawn, red, green, blue, depth, its slope along columns and rows, half width, height."""
+"""Numbers of a projected splat: column, row, the inverse covariance (xx, xy, yy), opacity, logarithm of the least
+share of it that is drawn, red, green, blue, depth, its slope along columns and rows, half width, half height."""
 
 _compiled = compiled(fastmath={"contract", "reassoc", "nsz"})
 
@@ -68,7 +68,8 @@ def placed(positions, sizes, rotations, order, matrix, out):  # type: ignore[no-
 def project(first, last, scene, view, low_pass, out, bounds):  # type: ignore[no-untyped-def]
     """Project splats first to last; a splat that is not drawn gets a last row before its first.
 
-    scene: (placed (splats, 9), order, opacities, harmonics (splats, coefficients, 3), scene from array (3, 3), near).
+    scene: (placed (splats, 9), order, opacities, harmonics (splats, coefficients, 3), scene from array
+        (3, 3), near).
     view: (x, y, left, top, columns per tangent, rows per tangent, columns, rows), see `ViewCamera`.
     low_pass: (variance added to both axes, square pixels; whether opacity is lowered so that the sum of a splat
         stays). out: (splats, RECORD) float32. bounds: (splats, 4) int16, first and last row and column of tiles.
@@ -108,7 +109,7 @@ def project(first, last, scene, view, low_pass, out, bounds):  # type: ignore[no
             continue
         least = math.log(LEAST_ALPHA / opacity)
         half_width, half_height = math.sqrt(-2 * least * xx), math.sqrt(-2 * least * yy)
-        low, high = int(math.floor((rows - 1) / TILE)), int(math.floor((columns - 1) / TILE))
+        low, high = math.floor((rows - 1) / TILE), math.floor((columns - 1) / TILE)
         above, below = max((row - half_height) / TILE, 0.0), min((row + half_height) / TILE, float(low))
         start, end = max((column - half_width) / TILE, 0.0), min((column + half_width) / TILE, float(high))
         if not (above <= below and start <= end):
@@ -156,8 +157,8 @@ def colour(c, coefficients, x, y, z, record):  # type: ignore[no-untyped-def]
 def blend(first, last, records, bounds, background, image, depths, with_depth, ended):  # type: ignore[no-untyped-def]
     """Draw the rows of tiles first to last of an image.
 
-    records, bounds: of `project`, in order of depth. background: (3,). image: (rows, columns, 4), red, green, blue and
-        transmittance. depths: (rows, columns), depth at which the transmittance falls below ½, infinite if it
+    records, bounds: of `project`, in order of depth. background: (3,). image: (rows, columns, 4), red, green, blue
+        and transmittance. depths: (rows, columns), depth at which the transmittance falls below ½, infinite if it
         does not; (0, 0) unless with_depth. ended: see `Workers`.
     """
     rows, columns = image.shape[:2]
@@ -214,10 +215,10 @@ def draw(s, x0, y0, light, median, alpha, with_depth):  # type: ignore[no-untype
     xx, xy, yy = s[2], s[3], s[4]
     opacity, least = s[5], s[6]
     red, green, blue = s[7], s[8], s[9]
-    top = max(int(math.ceil(row - s[14])), 0)
-    bottom = min(int(math.floor(row + s[14])), TILE - 1)
-    start = max(int(math.ceil(column - s[13])), 0) // LANES * LANES
-    end = min(int(math.floor(column + s[13])), TILE - 1) + 1
+    top = max(math.ceil(row - s[14]), 0)
+    bottom = min(math.floor(row + s[14]), TILE - 1)
+    start = max(math.ceil(column - s[13]), 0) // LANES * LANES
+    end = min(math.floor(column + s[13]), TILE - 1) + 1
     half, one, most = np.float32(0.5), np.float32(1), np.float32(MOST_ALPHA)
     for y in range(top, bottom + 1):
         dy = np.float32(y) - row

@@ -12,7 +12,6 @@ import struct
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +92,8 @@ def _read_ply(path: Path) -> Splats:
     if missing:
         kind = "a mesh or points" if "f_dc_0" in missing and "rot_0" in missing else "splats of another kind"
         raise InputError(
-            f"the PLY has no {', '.join(missing[:4])}{' …' if len(missing) > 4 else ''}, which 3D Gaussian splatting "
-            f"writes: it holds {kind}"
+            f"the PLY has no {', '.join(missing[:4])}{' …' if len(missing) > 4 else ''}, which 3D Gaussian "
+            f"splatting writes: it holds {kind}"
         )
     wrong = [field for field, kind in fields if field in _NEEDED and kind not in ("f4", "f8")]
     if wrong or len(set(names)) < len(names):
@@ -105,8 +104,8 @@ def _read_ply(path: Path) -> Splats:
     size = path.stat().st_size
     if start + count * layout.itemsize > size:
         raise InputError(
-            f"the PLY is truncated: its header states {count} splats of {layout.itemsize} bytes, and after it there "
-            f"are {max(size - start, 0)} bytes"
+            f"the PLY is truncated: its header states {count} splats of {layout.itemsize} bytes, and after it "
+            f"there are {max(size - start, 0)} bytes"
         )
     rest = sum(field.startswith("f_rest_") for field in names)
     if rest not in (0, 9, 24, 45) or any(f"f_rest_{n}" not in names for n in range(rest)):
@@ -131,7 +130,7 @@ def _read_ply(path: Path) -> Splats:
             columns("x", "y", "z"),
             np.exp(columns("scale_0", "scale_1", "scale_2")),
             unit_quaternions(columns("rot_0", "rot_1", "rot_2", "rot_3")),
-            (1 / (1 + np.exp(-columns("opacity")[:, 0]))).astype(np.float32),
+            np.asarray(1 / (1 + np.exp(-columns("opacity")[:, 0])), dtype=np.float32),
             harmonics,
         )
 
@@ -142,7 +141,8 @@ def _ply_header(head: bytes) -> tuple[str, list[tuple[str, int, list[tuple[str, 
     newline = head.find(b"\n", end) if end >= 0 else -1
     if not head.startswith(b"ply") or newline < 0:
         raise InputError("this is not a PLY: it has no header from ply to end_header")
-    order, elements = "", []
+    order = ""
+    elements: list[tuple[str, int, list[tuple[str, str]]]] = []
     for line in head[:end].decode("ascii", "replace").splitlines()[1:]:
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
@@ -177,7 +177,7 @@ def _read_splat(path: Path) -> Splats:
             f"{len(data) % _SPLAT.itemsize} left over: it is truncated or something else"
         )
     table = np.frombuffer(data, _SPLAT)
-    colour = table["colour"].astype(np.float32) / 255
+    colour = np.asarray(table["colour"] / 255, dtype=np.float32)
     return Splats(
         table["place"].astype(np.float32),
         table["size"].astype(np.float32),
@@ -227,7 +227,7 @@ def _read_spz(path: Path) -> Splats:
         positions,
         np.exp(size.astype(np.float32) / 16 - 10),
         _three_of_four(turned) if version == 2 else _smallest_three(turned),
-        alpha[:, 0].astype(np.float32) / 255,
+        np.asarray(alpha[:, 0] / 255, dtype=np.float32),
         harmonics,
         antialiased=bool(flags & _ANTIALIASED),
         up=_UP_OF_GLTF,
@@ -237,8 +237,8 @@ def _read_spz(path: Path) -> Splats:
 def _consecutive(data: bytes, sizes: Sequence[int]) -> list[bytes]:
     if sum(sizes) > len(data):
         raise InputError(
-            f"the .spz is truncated: its header states {sizes[1]} splats, which have {sum(sizes)} bytes, and after "
-            f"it there are {len(data)}"
+            f"the .spz is truncated: its header states {sizes[1]} splats, which have {sum(sizes)} bytes, and "
+            f"after it there are {len(data)}"
         )
     ends = np.cumsum(sizes).tolist()
     return [data[end - size : end] for end, size in zip(ends, sizes, strict=True)]
@@ -268,7 +268,7 @@ def _streams(path: Path, data: bytes, streams: int, sizes: Sequence[int]) -> lis
         out = imagecodecs.zstd_decode(data[start : start + packed], out=size)
         if len(out) != size:
             raise InputError(f"stream {number} of the .spz unpacks to {len(out)} bytes, not {size}")
-        found.append(out)
+        found.append(bytes(out))
         start += packed
     left = iter(found)
     return [next(left) if size else b"" for size in sizes]

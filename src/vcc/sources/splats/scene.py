@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
-from functools import partial
 from os import PathLike
 from typing import Any, Literal, get_args
 
@@ -30,13 +29,17 @@ _SPLATS_AT_ONCE = 2**15
 _ROWS_AT_ONCE = 3
 
 
+class NothingSeen(InputError):
+    """An array sees no splats."""
+
+
 class SplatScene:
     """The views of 3D Gaussian splats; a renderer for `vcc.sources.synthesize`.
 
-    Each view is a perspective image of its own pinhole, with occlusion and the view-dependent colours of the splats:
-    splats are projected by Σ' = J W Σ Wᵀ Jᵀ plus a low-pass, sorted by depth and blended front to back (Kerbl et al.
-    2023). Splats are drawn where their opacity is at least 1/255, with at most 0.99, until the transmittance of a
-    whole tile is below 1e-4. The result does not depend on the number of threads.
+    Each view is a perspective image of its own pinhole, with occlusion and the view-dependent colours of the
+    splats: splats are projected by Σ' = J W Σ Wᵀ Jᵀ plus a low-pass, sorted by depth and blended front to back
+    (Kerbl et al. 2023). Splats are drawn where their opacity is at least 1/255, with at most 0.99, until the
+    transmittance of a whole tile is below 1e-4. The result does not depend on the number of threads.
 
     Args:
         splats: a file (.ply, .splat, .spz, .glb, .gltf), or `Splats`.
@@ -88,7 +91,7 @@ class SplatScene:
         matrix = viewpoint.array_from_scene()
         depth = -(cloud.positions @ matrix[2, :3] + matrix[2, 3])
         if not (depth > self._near).any():
-            raise InputError(
+            raise NothingSeen(
                 f"all {len(depth)} splats are behind the array or nearer than {near:g} scene units: move the "
                 "viewpoint's eye or target, or pass a smaller near"
             )
