@@ -109,9 +109,11 @@ def project(first, last, scene, view, low_pass, out, bounds):  # type: ignore[no
             continue
         least = math.log(LEAST_ALPHA / opacity)
         half_width, half_height = math.sqrt(-2 * least * xx), math.sqrt(-2 * least * yy)
-        low, high = math.floor((rows - 1) / TILE), math.floor((columns - 1) / TILE)
-        above, below = max((row - half_height) / TILE, 0.0), min((row + half_height) / TILE, float(low))
-        start, end = max((column - half_width) / TILE, 0.0), min((column + half_width) / TILE, float(high))
+        above, below = max((row - half_height) / TILE, 0.0), min((row + half_height) / TILE, (rows - 1) / TILE)
+        start, end = (
+            max((column - half_width) / TILE, 0.0),
+            min((column + half_width) / TILE, (columns - 1) / TILE),
+        )
         if not (above <= below and start <= end):
             continue
         bounds[n, 0], bounds[n, 1], bounds[n, 2], bounds[n, 3] = int(above), int(below), int(start), int(end)

@@ -1,0 +1,249 @@
+"""Files of splats: what is written byte by byte here is read; damaged and hostile files raise errors."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import struct
+
+import imagecodecs
+import numpy as np
+import pytest
+
+from tests.sources.splat_clouds import cloud
+from vcc import InputError
+from vcc.sources.splats import SplatScene, read_splats, write_ply
+
+C0 = 0.28209479177387814
+COUNT = 7
+
+
+def fields(degree: int = 3) -> list[str]:
+    rest = 3 * ((degree + 1) ** 2 - 1)
+    return [
+        *("x", "y", "z", "nx", "ny", "nz"), *(f"f_dc_{n}" for n in range(3)), *(f"f_rest_{n}" for n in range(rest)),
+        "opacity", *(f"scale_{n}" for n in range(3)), *(f"rot_{n}" for n in range(4)),
+    ]  # fmt: skip
+
+
+def ply(
+    names: list[str], rows: np.ndarray, count: int | None = None, order: str = "little", kind="float"
+) -> bytes:
+    lines = ["ply", f"format binary_{order}_endian 1.0", "comment made by a test"]
+    lines += [f"element vertex {len(rows) if count is None else count}", *(f"property {kind} {n}" for n in names)]
+    code = ("<" if order == "little" else ">") + ("f4" if kind == "float" else "f8")
+    return "\n".join([*lines, "end_header\n"]).encode() + rows.astype(code).tobytes()
+
+
+def table(degree: int = 3) -> np.ndarray:
+    return np.random.default_rng(6).normal(0, 0.7, (COUNT, len(fields(degree))))
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2, 3])
+@pytest.mark.parametrize(("order", "kind"), [("little", "float"), ("big", "double")])
+def test_ply(tmp_path, degree, order, kind):
+    names, rows = fields(degree), table(degree)
+    path = tmp_path / "a.ply"
+    path.write_bytes(ply(names, rows, order=order, kind=kind))
+    found = read_splats(path)
+
+    def of(*wanted):
+        return rows[:, [names.index(name) for name in wanted]]
+
+    assert found.degree == degree
+    assert np.allclose(found.positions, of("x", "y", "z"))
+    assert np.allclose(found.sizes, np.exp(of("scale_0", "scale_1", "scale_2")))
+    assert np.allclose(found.opacities, 1 / (1 + np.exp(-of("opacity")[:, 0])))
+    turn = of("rot_0", "rot_1", "rot_2", "rot_3")
+    assert np.allclose(found.rotations, turn / np.linalg.norm(turn, axis=1)[:, None], atol=1e-6)
+    assert np.allclose(found.harmonics[:, 0], of("f_dc_0", "f_dc_1", "f_dc_2"))
+    each = (degree + 1) ** 2 - 1
+    for n in range(each):  # channel by channel
+        assert np.allclose(found.harmonics[:, 1 + n], of(*(f"f_rest_{c * each + n}" for c in range(3))))
+    write_ply(found, tmp_path / "b.ply")
+    again = read_splats(tmp_path / "b.ply")
+    for name in ("positions", "sizes", "rotations", "opacities", "harmonics"):
+        assert np.allclose(getattr(again, name), getattr(found, name), rtol=1e-6, atol=1e-7)
+
+
+def test_splat(tmp_path):
+    data = b"".join(
+        struct.pack("<6f4B4B", n, 2, -3, 0.1, 0.2, 0.3, 255, 0, 51, 204, 128, 128, 0, 128) for n in range(3)
+    )
+    (tmp_path / "a.splat").write_bytes(data)
+    found = read_splats(tmp_path / "a.splat")
+    assert np.allclose(found.positions[:, 0], [0, 1, 2])
+    assert np.allclose(found.sizes[1], [0.1, 0.2, 0.3])
+    assert np.allclose(0.5 + C0 * found.harmonics[0, 0], [1, 0, 0.2], atol=1e-6)
+    assert np.allclose(found.opacities, 0.8)
+    assert np.allclose(found.rotations[0], [0, 0, -1, 0])  # bytes w, x, y, z around 128
+
+
+def spz_parts(version: int, degree: int = 1, fraction: int = 12) -> list[bytes]:
+    """Two splats: at (1.5, −0.25, 2) and elsewhere; half opaque; log sizes −6, −4, −2; turned about x."""
+    place = b"".join(int(v * 2**fraction).to_bytes(3, "little", signed=True) for v in (1.5, -0.25, 2, -7, 0, 1))
+    colour = bytes([255, 0, 128] * 2)
+    sizes = bytes([(n + 10) * 16 for n in (-6, -4, -2)] * 2)
+    if version == 2:  # (x, y, z) around 127.5
+        turns = bytes([round((0.6 + 1) * 127.5), 128, 127] * 2)
+    else:  # the largest is w (3); then x, y, z, each a sign and nine bits of 1/√2, x in the highest bits
+        x = round(0.6 / np.sqrt(0.5) * 511)
+        turns = struct.pack("<I", 3 << 30 | x << 20) + struct.pack("<I", 3 << 30 | (x | 512) << 20)
+    rest = bytes([128, 192, 0] * ((degree + 1) ** 2 - 1) * 2)
+    return [place, bytes([128, 255]), colour, sizes, turns, rest]
+
+
+def spz(version: int, degree: int = 1, count: int = 2, flags: int = 1, parts: list[bytes] | None = None) -> bytes:
+    streams = spz_parts(version, degree) if parts is None else parts
+    head = struct.pack("<4sIIBBB", b"NGSP", version, count, degree, 12, flags)
+    if version < 4:
+        return gzip.compress(head + b"\0" + b"".join(streams))
+    streams = [part for part in streams if part]
+    packed = [imagecodecs.zstd_encode(part) for part in streams]
+    sizes = b"".join(struct.pack("<QQ", len(p), len(part)) for p, part in zip(packed, streams, strict=True))
+    return head + struct.pack("<BI12x", len(streams), 32) + sizes + b"".join(packed)
+
+
+@pytest.mark.parametrize("version", [2, 3, 4])
+@pytest.mark.parametrize("degree", [0, 1, 3, 4])
+def test_spz(tmp_path, version, degree):
+    (tmp_path / "a.spz").write_bytes(spz(version, degree))
+    found = read_splats(tmp_path / "a.spz")
+    assert found.degree == min(degree, 3)
+    assert found.antialiased
+    assert found.up == (0, 1, 0)
+    assert np.allclose(found.positions, [[1.5, -0.25, 2], [-7, 0, 1]])
+    assert np.allclose(np.log(found.sizes), [[-6, -4, -2]] * 2, atol=1e-6)
+    assert np.allclose(found.opacities, [128 / 255, 1])
+    assert np.allclose(found.harmonics[0, 0], (np.array([255, 0, 128]) / 255 - 0.5) / 0.15)
+    assert np.allclose(found.harmonics[:, 1:], [0, 0.5, -1])
+    assert np.allclose(np.abs(found.rotations[0]), [0.8, 0.6, 0, 0], atol=0.01)
+    if version > 2:
+        assert found.rotations[1, 1] < 0 < found.rotations[0, 1]
+
+
+def gltf(tmp_path, name="a.glb", edit=None, node=None):
+    splats = cloud(COUNT, degree=1)
+    prefix = "KHR_gaussian_splatting:"
+    arrays = {
+        "POSITION": splats.positions, f"{prefix}SCALE": splats.sizes,
+        f"{prefix}ROTATION": splats.rotations[:, [1, 2, 3, 0]], f"{prefix}OPACITY": splats.opacities,
+        f"{prefix}SH_DEGREE_0_COEF_0": splats.harmonics[:, 0],
+        **{f"{prefix}SH_DEGREE_1_COEF_{n}": splats.harmonics[:, 1 + n] for n in range(3)},
+    }  # fmt: skip
+    binary, accessors, views = b"", [], []
+    for values in arrays.values():
+        views.append({"buffer": 0, "byteOffset": len(binary), "byteLength": values.nbytes})
+        kind = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}[1 if values.ndim == 1 else values.shape[1]]
+        accessors.append({"bufferView": len(views) - 1, "componentType": 5126, "count": COUNT, "type": kind})
+        binary += np.ascontiguousarray(values).tobytes()
+    attributes = {each: n for n, each in enumerate(arrays)}
+    stated = {"kernel": "ellipse", "colorSpace": "lin_rec709_display"}
+    primitive = {"attributes": attributes, "mode": 0, "extensions": {"KHR_gaussian_splatting": stated}}
+    tree = {
+        "asset": {"version": "2.0"}, "buffers": [{"byteLength": len(binary)}], "bufferViews": views,
+        "accessors": accessors, "meshes": [{"primitives": [primitive]}], "nodes": [{"mesh": 0} | (node or {})],
+    }  # fmt: skip
+    if edit:
+        edit(tree)
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = (
+        struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    )
+    path = tmp_path / name
+    path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    return path, splats
+
+
+def test_gltf(tmp_path):
+    path, splats = gltf(tmp_path, node={"translation": [1, 2, 3], "scale": [2, 2, 2]})
+    found = read_splats(path)
+    assert found.transfer == "linear"
+    assert np.allclose(found.positions, 2 * splats.positions + [1, 2, 3])
+    assert np.allclose(found.sizes, 2 * splats.sizes)
+    assert np.allclose(found.rotations, splats.rotations, atol=1e-6)
+    assert np.allclose(found.opacities, splats.opacities)
+    assert np.allclose(found.harmonics, splats.harmonics)
+
+
+def _set(*keys, value):
+    def edit(tree):
+        for key in keys[:-1]:
+            tree = tree[key]
+        tree[keys[-1]] = value
+
+    return edit
+
+
+EXTENSION = ("meshes", 0, "primitives", 0, "extensions", "KHR_gaussian_splatting")
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (_set("accessors", 0, "count", value=2**40), "states 1099511627776 splats"),
+        (_set("accessors", 1, "type", value="VEC2"), "SCALE of the glTF has the type 'VEC2'"),
+        (_set("accessors", 1, "componentType", value=5125), "must have 3 floats"),
+        (_set("accessors", 0, "bufferView", value=77), r"bufferViews\[77\]"),
+        (_set("bufferViews", 0, "byteOffset", value=-4), "offsets"),
+        (_set("buffers", 0, "uri", value="../secret.bin"), "a file of the same folder"),
+        (_set(*EXTENSION, "kernel", value="box"), "kernel 'box'"),
+        (_set(*EXTENSION, "extensions", value={"KHR_gaussian_splatting_compression_spz_2": {}}), "extended by"),
+        (_set("nodes", 0, "rotation", value=[0, 1, 0, 0]), "rotates or stretches"),
+        (_set("nodes", value=[]), "no node with splats"),
+    ],
+)
+def test_other_gltf_raises(tmp_path, edit, message):
+    path, _ = gltf(tmp_path, edit=edit)
+    with pytest.raises(InputError, match=message):
+        read_splats(path)
+
+
+def other(names=None, rows=None, **how):
+    names = names or fields(0)
+    return ply(names, table(0) if rows is None else rows, **how)
+
+
+NAN = table(0)
+NAN[3, 1] = np.nan
+ZERO = table(0)
+ZERO[2, -4:] = 0
+HUGE = table(0)
+HUGE[1, fields(0).index("scale_1")] = 200
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "message"),
+    [
+        ("a.ply", other()[:-5], "truncated: its header states 7 splats of 68 bytes, and after it there are 471"),
+        ("a.ply", other(count=2**40), "truncated"),
+        ("a.ply", other(count=0), "there are no splats"),
+        ("a.ply", other(["u", *fields(0)[1:]]), "has no x, which 3D Gaussian splatting writes"),
+        ("a.ply", other()[:40], "not a PLY"),
+        ("a.ply", other().replace(b"binary_little_endian", b"ascii"), "save it as binary_little_endian"),
+        ("a.ply", other().replace(b"property float x", b"property flot x"), 'the line "property flot x"'),
+        ("a.ply", other().replace(b"property float x", b"property int x"), "integers"),
+        ("a.ply", other().replace(b"float nx", b"float f_rest_0"), "has 1 fields f_rest_"),
+        ("a.ply", other(rows=NAN), "1 of 7 splats have invalid positions .* the first is splat 3"),
+        ("a.ply", other(rows=ZERO), "1 of 7 splats have no rotation"),
+        ("a.ply", other(rows=HUGE), "1 of 7 splats have invalid sizes"),
+        ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement chunk 1\nproperty float a\nelement vertex 1\n"
+         b"property uint packed_position\nend_header\n" + bytes(99), "compressed"),
+        ("a.splat", bytes(33), "with 1 left over"),
+        ("a.splat", b"", "no splats"),
+        ("a.spz", spz(3)[:-9], "cannot be read as"),
+        ("a.spz", spz(3, count=2**31), "truncated: its header states 2147483648 splats"),
+        ("a.spz", spz(4, count=2**31), "no file packs as well"),
+        ("a.spz", spz(4, count=3), "stream 0 of the .spz states"),
+        ("a.spz", spz(4)[:-4], "bytes are left"),
+        ("a.spz", spz(4)[:30], "truncated or damaged"),
+        ("a.spz", gzip.compress(b"NGSP" + struct.pack("<II", 1, 2) + bytes(99)), "version 1"),
+        ("a.glb", b"glTF" + bytes(30), "not JSON"),
+        ("a.ksplat", b"", "read from .ply, .splat"),
+    ],
+)  # fmt: skip
+def test_other_files_raise(tmp_path, name, data, message):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(InputError, match=message):
+        SplatScene(tmp_path / name)
