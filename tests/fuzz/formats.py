@@ -107,6 +107,13 @@ FORMATS = {
     "pbrt scene": Format(seeds.pbrt_scene, "a.pbrt", readers.pbrt),
     "mitsuba scene": Format(seeds.mitsuba_scene, "a.xml", readers.mitsuba),
     "obj mesh": Format(seeds.mesh, "a.obj", readers.mesh),
+    "splats ply": Format(seeds.splats("a.ply"), "a.ply", readers.splats),
+    "splats splat": Format(seeds.splats("a.splat"), "a.splat", readers.splats),
+    "splats spz 2": Format(seeds.splats("a.spz", 2), "a.spz", readers.splats),
+    "splats spz 4": Format(seeds.splats("a.spz", 4), "a.spz", readers.splats),
+    "splats glb": Format(seeds.splats("a.glb"), "a.glb", readers.splats),
+    "poses transforms": Format(seeds.text("a.json", seeds.POSES), "a.json", readers.poses),
+    "poses cameras": Format(seeds.text("a.json", seeds.CAMERAS), "a.json", readers.poses),
     "info": Format(seeds.views_csv, "", readers.info),
     "info video": Format(seeds.light_field_video, "v.zarr", readers.info),
 }

@@ -109,7 +109,7 @@ def test_views_are_the_sum_over_all_splats(low_pass, viewpoint):
 
 @pytest.mark.parametrize("place", [(0, 0), (1, 1), (2, 0)])
 def test_one_splat_in_closed_form(place):
-    """A ball of standard deviation σ at depth Z is a Gaussian of σ·f/Z pixels at the place that the frame gives."""
+    """A ball of standard deviation σ at depth Z is a Gaussian of σ·f/Z pixels where the frame has it."""
     x, y, depth, size = 0.07, -0.05, 1.6, 0.05
     one = Splats(
         *(np.array([each], np.float32) for each in ([x, y, depth], [size] * 3, [1, 0, 0, 0])),

@@ -99,7 +99,7 @@ def _of_splatting(number: int, frame: dict[str, Any]) -> PosedCamera:
 def _numbers(frame: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> Any:
     try:
         values = np.asarray(frame.get(key), dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         values = np.empty(0)
     if values.shape != shape or not np.isfinite(values).all():
         raise InputError(f"camera {name}: {key} is not {'×'.join(map(str, shape))} finite numbers")
