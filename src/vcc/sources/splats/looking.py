@@ -114,8 +114,8 @@ def seen(scene: SplatScene, field_of_view: float, pixels: tuple[int, int] = (_TH
     if not solid.size:
         eye = ", ".join(f"{part:.4g}" for part in scene.viewpoint.eye)
         raise NothingSeen(
-            f"the view from ({eye}) shows no object: nothing in it absorbs half of the light. Choose another camera "
-            "(--look lists some), or move the eye"
+            f"the view from ({eye}) shows no object: nothing in it absorbs half of the light. Choose another "
+            "camera (--look lists some), or move the eye"
         )
     nearest, farthest = np.percentile(solid, _ENDS)
     return Seen(image, float(nearest), float(farthest), 1 - float(transmittance.mean()))
