@@ -2,6 +2,7 @@
 
 import json
 
+import imagecodecs
 import numpy as np
 import pytest
 
@@ -51,7 +52,10 @@ def test_look_lists_cameras_and_draws_them(folder, poses):
     assert lines[2].split()[-1] == ("front" if poses else "0°")
     if poses:  # 2 − 0.4 m
         assert lines[2].split()[2:4] == ["1.6", "m"]
-    assert (folder / "sheet.png").stat().st_size > 5000
+    sheet = imagecodecs.png_decode((folder / "sheet.png").read_bytes())[..., :3].astype(int)
+    for colour in range(2):  # both balls are drawn
+        others = np.delete(sheet, colour, axis=-1).max(axis=-1)
+        assert ((sheet[..., colour] > 150) & (others < 100)).sum() > 100
 
 
 def test_eye_and_target(folder):

@@ -2,12 +2,12 @@
 
 Each pixel of the middle view becomes a ball of its colour at its distance, 0.45 pixels in standard deviation. From
 the views at the corners come the pixels that the middle view does not show: those that are behind its objects, and
-those beyond its borders. Distances are those of render_desk.py (Mitsuba), of glass those of its surface. The colours
-of the middle view's balls are then corrected ten times by what its image lacks, since balls overlap.
+those beyond its borders. Distances are those of render_desk.py (Mitsuba), of glass those of its surface. The
+colours of the middle view's balls are then corrected ten times by what its image lacks, since balls overlap.
 
-Colours are the radiance as rendered, in sRGB codes up to 1.4. The file is .spz version 3 (README of nianticlabs/spz):
-y up, z backwards, in metres. The array of desk.zarr stands at the origin. The program prints the difference from
-views of desk.zarr that were not used.
+Colours are the radiance as rendered, in sRGB codes up to 1.4. The file is .spz version 3 (README of
+nianticlabs/spz): y up, z backwards, in metres. The array of desk.zarr stands at the origin. The program prints the
+difference from views of desk.zarr that were not used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import render_desk
 from numpy.typing import NDArray
 
 from vcc.base.measures import decibels
-from vcc.files.transfer import from_linear
+from vcc.files.transfer import from_linear, to_linear
 from vcc.sources import ViewCamera
 from vcc.sources.mitsuba import MitsubaRenderer
 from vcc.sources.splats import Splats, SplatScene
@@ -45,9 +45,10 @@ Array = NDArray[Any]
 
 
 def radiance(desk: StoredLightField, place: tuple[int, int]) -> Array:
-    """A view as it was rendered; the store has shares of full scale."""
+    """A view as it was rendered, but no brighter than the format stores, with its colour."""
     (row, column), full_scale = place, desk.provenance["full_scale"]
-    return np.asarray(desk[row : row + 1, column : column + 1].values[0, 0] * full_scale)
+    rendered = desk[row : row + 1, column : column + 1].values[0, 0] * full_scale
+    return np.asarray(rendered * np.minimum(to_linear(BRIGHTEST) / np.maximum(rendered.max(axis=-1, keepdims=True), 1e-9), 1))
 
 
 def points(camera: ViewCamera, depth: Array) -> Array:
@@ -116,9 +117,9 @@ def main() -> None:
         codes.append(from_linear(views[corner])[new])
         shown.append(corner)
         print(f"{corner}: {new.sum()} pixels that no view before it shows")
-    at, colour = np.concatenate(places), np.minimum(np.concatenate(codes), BRIGHTEST)
+    at, colour = np.concatenate(places), np.concatenate(codes)
     widths = WIDTH * slope * at[:, 2]
-    wanted, own = np.minimum(codes[0], BRIGHTEST), len(codes[0])
+    wanted, own = codes[0].copy(), len(codes[0])
     for _ in range(10):
         scene = SplatScene(splats(at, colour, widths), transfer="linear")
         lacks = wanted - scene.render(middle).reshape(-1, 3)

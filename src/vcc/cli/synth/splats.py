@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
@@ -36,8 +36,6 @@ class ViewsOfSplats(ViewsAndPixels):
     Args:
         aperture: Side of the square that the views fill, "20 mm"; two lengths are height and width. Default: by
             --parallax.
-        parallax: Largest displacement of an object from one view to the next, pixels; it determines the spacing.
-            Default: 1.
         field_of_view: Angle that the width of a view spans, "40 deg". Default: that of the camera.
         focus_distance: Where the views converge, "1.3 m", or inf for parallel. Default: in the middle of the
             visible depth.
@@ -46,30 +44,20 @@ class ViewsOfSplats(ViewsAndPixels):
     views: Counts = (9, 9)
     pixels: Counts = (512, 512)
     aperture: Lengths | None = None
-    parallax: Number | None = None
     field_of_view: Angle | None = None
     focus_distance: Length | None = None
 
-    def __post_init__(self) -> None:
-        if self.aperture is not None and self.parallax is not None:
-            raise InputError("--aperture and --parallax both determine the spacing of the views: give one of them")
-
-    def array(self, scene: SplatScene, field_of_view: float) -> CameraArray:
+    def array(self, scene: SplatScene, field_of_view: float, parallax: float) -> CameraArray:
         """The cameras of the views, spaced by what the middle view sees."""
         angle = self.field_of_view or field_of_view
-        slope = CameraArray.over_aperture(1.0, angle, pixels=self.pixels).slopes_per_pixel[1]
         if self.aperture is not None and self.focus_distance is not None:
-            return self._over(self.aperture, angle, self.focus_distance)
+            return self.cameras(field_of_view=angle)
         found = seen(scene, angle, self.pixels)
-        spacing, focus = arranged(found, slope, self.parallax or 1.0, self.focus_distance)
+        slope = CameraArray.over_aperture(1.0, angle, pixels=self.pixels).slopes_per_pixel[1]
+        spacing, focus = arranged(found, slope, parallax, self.focus_distance)
         show(f"objects are {short(found.nearest, digits=3)} to {short(found.farthest, digits=3)} away")
-        aperture = self.aperture or (spacing * self.views[0], spacing * self.views[1])
-        return self._over(aperture, angle, focus)
-
-    def _over(self, aperture: float | tuple[float, float], angle: float, focus: float) -> CameraArray:
-        return CameraArray.over_aperture(
-            aperture, angle, views=self.views, pixels=self.pixels, focus_distance=focus
-        )  # fmt: skip
+        aperture = (spacing * self.views[0], spacing * self.views[1])
+        return self.cameras(aperture=aperture, field_of_view=angle, focus_distance=focus)
 
 
 @Parameter(name="*", group=WHERE)
@@ -143,6 +131,7 @@ def splats(
     *,
     output: Annotated[Path | None, Parameter(alias="-o", metavar="STORE.zarr")] = None,
     look: bool = False,
+    parallax: Annotated[Number | None, Parameter(group=WHERE)] = None,
     where: ViewsOfSplats = ViewsOfSplats(),
     standing: Standing = Standing(),
     drawing: Drawing = Drawing(),
@@ -154,10 +143,14 @@ def splats(
         splats: A file .ply, .splat, .spz, .glb or .gltf.
         output: The store to write or to resume. With --look: the contact sheet, .png, .svg or .pdf.
         look: List cameras, and draw a contact sheet of what they see, instead of rendering.
+        parallax: Largest displacement of an object from one view to the next, pixels; it determines the spacing.
+            Default: 1, without --aperture.
     """
+    if where.aperture is not None and parallax is not None:
+        raise InputError("--aperture and --parallax both determine the spacing of the views: give one of them")
     options = {name: getattr(drawing, name) for name in ("low_pass", "transfer", "background", "degree", "near")}
     if look:
-        _look(splats, output, where, standing, options)
+        _look(splats, output, where, standing, parallax or 1.0, options)
         return
     if output is None:
         raise InputError("give --output STORE.zarr, the store to write, or --look to see where cameras can stand")
@@ -165,7 +158,7 @@ def splats(
     cloud = read_splats(splats)
     viewpoint, field_of_view = standing.viewpoint(cloud)
     scene = SplatScene(cloud, viewpoint, **options)
-    cameras = where.array(scene, field_of_view)
+    cameras = where.array(scene, field_of_view, parallax or 1.0)
     focus = cameras.focus_distance
     converge = "parallel views" if focus == float("inf") else f"views converge at {short(focus, digits=3)}"
     show(f"{converge}, {short(cameras.spacings[1], digits=3)} apart")
@@ -173,7 +166,12 @@ def splats(
 
 
 def _look(
-    splats: Path, output: Path | None, where: ViewsOfSplats, standing: Standing, options: dict[str, object]
+    splats: Path,
+    output: Path | None,
+    where: ViewsOfSplats,
+    standing: Standing,
+    parallax: float,
+    options: dict[str, Any],
 ) -> None:
     sheet = check_output(output or Path(f"{splats.stem}-cameras.png"), DRAWINGS)
     cloud = read_splats(splats)
@@ -193,7 +191,7 @@ def _look(
             cells += ["no object", "", "", "", ""]
         else:
             slope = CameraArray.over_aperture(1.0, angle, pixels=where.pixels).slopes_per_pixel[1]
-            spacing, focus = arranged(found, slope, where.parallax or 1.0, where.focus_distance)
+            spacing, focus = arranged(found, slope, parallax, where.focus_distance)
             cells += [short(length, digits=3) for length in (found.nearest, found.farthest, focus, spacing)]
             cells.append(f"{found.covered:.0%}")
         show("  ".join(f"{cell:>13}" for cell in cells) + f"  {camera.name}")
