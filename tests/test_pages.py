@@ -190,7 +190,13 @@ def write_given():
         Path(f"cotton/view_{row}_{column}.png").unlink()
     for name in ("camera.toml", "other.toml"):
         Path(name).write_text(CAMERA)
-    pose = {"img_name": "front", "width": 480, "fx": 963, "position": [0, 0, 0], "rotation": np.diag([1, -1, -1]).tolist()}
+    pose = {
+        "img_name": "front",
+        "width": 480,
+        "fx": 963,
+        "position": [0, 0, 0],
+        "rotation": np.diag([1, -1, -1]).tolist(),
+    }
     Path("cameras.json").write_text(json.dumps([pose]))
     write_depths()
     write_raw()
