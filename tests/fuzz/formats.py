@@ -112,8 +112,8 @@ FORMATS = {
     "splats spz 2": Format(seeds.splats("a.spz", 2), "a.spz", readers.splats),
     "splats spz 4": Format(seeds.splats("a.spz", 4), "a.spz", readers.splats),
     "splats glb": Format(seeds.splats("a.glb"), "a.glb", readers.splats),
-    "poses transforms": Format(seeds.text("a.json", seeds.POSES), "a.json", readers.poses),
-    "poses cameras": Format(seeds.text("a.json", seeds.CAMERAS), "a.json", readers.poses),
+    "cameras of transforms": Format(seeds.text("a.json", seeds.POSES), "a.json", readers.scene_cameras),
+    "cameras of splats": Format(seeds.text("a.json", seeds.CAMERAS), "a.json", readers.scene_cameras),
     "info": Format(seeds.views_csv, "", readers.info),
     "info video": Format(seeds.light_field_video, "v.zarr", readers.info),
 }

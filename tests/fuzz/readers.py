@@ -118,7 +118,7 @@ def splats(path: Path) -> Read:
     return _read(*values, sane=all(bool(np.isfinite(each).all()) for each in values))
 
 
-def poses(path: Path) -> Read:
+def scene_cameras(path: Path) -> Read:
     return _read(read_poses(path))
 
 

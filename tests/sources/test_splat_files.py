@@ -97,11 +97,11 @@ def test_spz(tmp_path, version, degree):
 
 
 def test_gltf(tmp_path):
-    path, splats = gltf(tmp_path, node={"translation": [1, 2, 3], "scale": [2, 2, 2]})
+    path, splats = gltf(tmp_path)
     found = read_splats(path)
     assert found.transfer == "linear"
-    assert np.allclose(found.positions, 2 * splats.positions + [1, 2, 3])
-    assert np.allclose(found.sizes, 2 * splats.sizes)
+    assert np.allclose(found.positions, splats.positions)
+    assert np.allclose(found.sizes, splats.sizes)
     assert np.allclose(found.rotations, splats.rotations, atol=1e-6)
     assert np.allclose(found.opacities, splats.opacities)
     assert np.allclose(found.harmonics, splats.harmonics)
@@ -123,15 +123,16 @@ EXTENSION = ("meshes", 0, "primitives", 0, "extensions", "KHR_gaussian_splatting
     ("edit", "message"),
     [
         (_set("accessors", 0, "count", value=2**40), "states 1099511627776 splats"),
-        (_set("accessors", 1, "type", value="VEC2"), "SCALE of the glTF has the type 'VEC2'"),
-        (_set("accessors", 1, "componentType", value=5125), "must have 3 floats"),
+        (_set("accessors", 0, "count", value=0), "there are no splats"),
+        (_set("accessors", 1, "type", value="VEC2"), "SCALE of the GLB is not 3 plain floats"),
+        (_set("accessors", 1, "componentType", value=5125), "is not 3 plain floats"),
         (_set("accessors", 0, "bufferView", value=77), r"bufferViews\[77\]"),
-        (_set("bufferViews", 0, "byteOffset", value=-4), "offsets"),
-        (_set("buffers", 0, "uri", value="../secret.bin"), "a file of the same folder"),
-        (_set(*EXTENSION, "kernel", value="box"), "kernel 'box'"),
-        (_set(*EXTENSION, "extensions", value={"KHR_gaussian_splatting_compression_spz_2": {}}), "extended by"),
-        (_set("nodes", 0, "rotation", value=[0, 1, 0, 0]), "rotates or stretches"),
-        (_set("nodes", value=[]), "no node with splats"),
+        (_set("bufferViews", 0, "byteOffset", value=-4), "are not valid"),
+        (_set("buffers", 0, "uri", value="../secret.bin"), "in the file"),
+        (_set(*EXTENSION, "kernel", value="box"), 'kernel "box"'),
+        (_set(*EXTENSION, "extensions", value={"KHR_gaussian_splatting_compression_spz_2": {}}), "compressed"),
+        (_set("nodes", 0, "rotation", value=[0, 1, 0, 0]), "moves its splats by a node"),
+        (_set("meshes", value=[]), "has 0 primitives"),
     ],
 )
 def test_other_gltf_raises(tmp_path, edit, message):

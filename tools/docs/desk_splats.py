@@ -48,7 +48,9 @@ def radiance(desk: StoredLightField, place: tuple[int, int]) -> Array:
     """A view as it was rendered, but no brighter than the format stores, with its colour."""
     (row, column), full_scale = place, desk.provenance["full_scale"]
     rendered = desk[row : row + 1, column : column + 1].values[0, 0] * full_scale
-    return np.asarray(rendered * np.minimum(to_linear(BRIGHTEST) / np.maximum(rendered.max(axis=-1, keepdims=True), 1e-9), 1))
+    return np.asarray(
+        rendered * np.minimum(to_linear(BRIGHTEST) / np.maximum(rendered.max(axis=-1, keepdims=True), 1e-9), 1)
+    )
 
 
 def points(camera: ViewCamera, depth: Array) -> Array:

@@ -51,10 +51,10 @@ BOMBS = {
     "glb count 10^18": Bomb(_accessor(count=10**18), "a.glb", readers.splats),
     "glb offset 10^30": Bomb(_accessor(byteOffset=10**30), "a.glb", readers.splats),
     "glb deep": _splats(struct.pack("<4sIIII", b"glTF", 2, 200020, 200000, 0x4E4F534A) + b"[" * 200000, "a.glb"),
-    "poses deep": Bomb(written("a.json", b"[" * 200000), "a.json", readers.poses),
-    "poses 10^400": Bomb(
+    "cameras deep": Bomb(written("a.json", b"[" * 200000), "a.json", readers.scene_cameras),
+    "cameras 10^400": Bomb(
         written("a.json", json.dumps({"w": 10**400, "fl_x": 10**400, "frames": [{}]}).encode()),
         "a.json",
-        readers.poses,
+        readers.scene_cameras,
     ),
 }

@@ -140,7 +140,7 @@ def splats(
     """Render Gaussian splats: true views with occlusion, and the disparities of the middle one.
 
     Args:
-        splats: A file .ply, .splat, .spz, .glb or .gltf.
+        splats: A file .ply, .splat, .spz or .glb.
         output: The store to write or to resume. With --look: the contact sheet, .png, .svg or .pdf.
         look: List cameras, and draw a contact sheet of what they see, instead of rendering.
         parallax: Largest displacement of an object from one view to the next, pixels; it determines the spacing.

@@ -21,6 +21,8 @@ Transfer = Literal["srgb", "linear"]
 DEGREE_0 = 0.5 / math.sqrt(math.pi)
 """The spherical harmonic of degree 0, a constant."""
 HIGHEST_DEGREE = 3
+UP_OF_GLTF = (0.0, 1.0, 0.0)
+"""Upward direction of glTF and .spz by convention; the negative one is that of PLY and .splat."""
 LARGEST = 1e9
 """Largest coordinate or size, scene units: squares of these over squares of the smallest fit float64."""
 

@@ -1,4 +1,4 @@
-"""Files of Gaussian splats: PLY of 3D Gaussian splatting, .splat, .spz and glTF with KHR_gaussian_splatting.
+"""Files of Gaussian splats: PLY of 3D Gaussian splatting, .splat, .spz and GLB with KHR_gaussian_splatting.
 
 Sources: the layout of point_cloud.ply in the code release of Kerbl et al. 2023; .splat as the viewer by Kevin Kwok
 defines it; the README of nianticlabs/spz for versions 2 to 4; the glTF extension KHR_gaussian_splatting (Khronos,
@@ -19,20 +19,18 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, expanded, most_unpacked, read_bytes, reading, unpacked_gzip
 from vcc.files.atomic import atomic_path
-from vcc.sources.splats.cloud import DEGREE_0, HIGHEST_DEGREE, Floats, Splats, unit_quaternions
-from vcc.sources.splats.gltf import read_gltf
+from vcc.sources.splats.cloud import DEGREE_0, HIGHEST_DEGREE, UP_OF_GLTF, Floats, Splats, unit_quaternions
+from vcc.sources.splats.glb import read_glb
 
-SPLAT_ENDINGS = (".ply", ".splat", ".spz", ".glb", ".gltf")
+SPLAT_ENDINGS = (".ply", ".splat", ".spz", ".glb")
 """Supported file extensions."""
-
-_UP_OF_GLTF = (0.0, 1.0, 0.0)
 
 
 def read_splats(path: str | PathLike[str]) -> Splats:
     """Read a cloud of Gaussian splats.
 
     Args:
-        path: a file .ply, .splat, .spz, .glb or .gltf.
+        path: a file .ply, .splat, .spz or .glb.
 
     Returns:
         The splats, in the axes of the file: y down by convention in PLY and .splat, up in .spz and glTF.
@@ -56,7 +54,7 @@ def read_splats(path: str | PathLike[str]) -> Splats:
             return _read_splat(found)
         if ending == ".spz":
             return _read_spz(found)
-        return read_gltf(found)
+        return read_glb(found)
 
 
 # --- PLY ---
@@ -230,7 +228,7 @@ def _read_spz(path: Path) -> Splats:
         np.asarray(alpha[:, 0] / 255, dtype=np.float32),
         harmonics,
         antialiased=bool(flags & _ANTIALIASED),
-        up=_UP_OF_GLTF,
+        up=UP_OF_GLTF,
     )
 
 

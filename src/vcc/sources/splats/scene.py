@@ -42,9 +42,9 @@ class SplatScene:
     transmittance of a whole tile is below 1e-4. The result does not depend on the number of threads.
 
     Args:
-        splats: a file (.ply, .splat, .spz, .glb, .gltf), or `Splats`.
+        splats: a file (.ply, .splat, .spz, .glb), or `Splats`.
         viewpoint: position and orientation of the array in the scene's axes. Default: at the origin, along +z of
-            PLY and .splat (y down), or along −z of .spz and glTF (y up).
+            PLY and .splat (y down), or along −z of .spz and .glb (y up).
         low_pass: ``"3dgs"`` adds 0.3 px² to the variance of a projected splat, which makes small splats wider and
             brighter, as files are usually fitted. ``"mip"`` adds 0.1 px², close to the mean over a pixel (1/12
             px²), and lowers the opacity by the root of the ratio of areas (Yu et al. 2024). ``"none"`` adds
