@@ -121,7 +121,7 @@ def test_the_script_renders_and_keeps_a_tiny_desk(tmp_path, monkeypatch):
 def test_the_desk_as_splats_is_where_mitsuba_has_it(desk, disparity):
     scene = SplatScene(DOCS / "data" / "desk.spz")
     cameras = CameraArray((9, 9), (320, 480), SPACING, SLOPE, FOCUS)
-    # Balls are half a pixel wide, and the nearer ones of a slope absorb first: the depth is one of the 3×3 pixels'.
+    # Balls are half a pixel wide, and nearer ones of a slope absorb first: depth is that of one of 3×3 pixels.
     # The file has places to 1/8192 m, σ = 0.04 mm of rounding: du/slope · σ/Z² = 5e-4 pixels at 0.4 m.
     found = scene.disparity_maps(cameras).values[0]
     low, high = minimum_filter(disparity, 3) - 2e-3, maximum_filter(disparity, 3) + 2e-3

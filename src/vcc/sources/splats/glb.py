@@ -1,4 +1,4 @@
-"""Gaussian splats in GLB files: the glTF extension KHR_gaussian_splatting of Khronos, with the kernel "ellipse"."""
+"""Gaussian splats in GLB files: Khronos' glTF extension KHR_gaussian_splatting, with the kernel "ellipse"."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ def read_glb(path: Path) -> Splats:
     kernel, space = (str(value_at(stated, key)) for key in ("kernel", "colorSpace"))
     if kernel != "ellipse" or space not in (_SRGB, _LINEAR) or value_at(stated, "extensions"):
         raise InputError(
-            f'the GLB has splats of the kernel "{kernel[:30]}" in "{space[:30]}", or compressed ones; supported are '
-            f"plain ellipses in {_SRGB} or {_LINEAR}: {_WAY_OUT}"
+            f'the GLB has splats of the kernel "{kernel[:30]}" in "{space[:30]}", or compressed ones; supported '
+            f"are plain ellipses in {_SRGB} or {_LINEAR}: {_WAY_OUT}"
         )
     attributes = value_at(primitives[0], "attributes")
 
@@ -109,14 +109,15 @@ def _values(tree: Any, binary: bytes, attributes: Any, name: str, width: int) ->
     count = accessor.get("count")
     floats = accessor.get("componentType") == _FLOAT and _WIDTHS.get(str(accessor.get("type"))) == width
     view = _item(tree, "bufferViews", accessor.get("bufferView"))
-    if (
-        not floats
-        or "sparse" in accessor
-        or "extensions" in view
-        or value_at(tree, "buffers") != [{"byteLength": value_at(_item(tree, "buffers", 0), "byteLength")}]
-    ):
+    outside = view.get("buffer") != 0 or "uri" in _item(tree, "buffers", 0)
+    if not floats or outside or "sparse" in accessor or "extensions" in view:
         raise InputError(f"{name} of the GLB is not {width} plain floats for each splat in the file: {_WAY_OUT}")
-    numbers = (count, view.get("byteStride", 4 * width), view.get("byteOffset", 0), accessor.get("byteOffset", 0))
+    numbers: Any = (
+        count,
+        view.get("byteStride", 4 * width),
+        view.get("byteOffset", 0),
+        accessor.get("byteOffset", 0),
+    )
     if any(type(number) is not int or number < 0 for number in numbers) or numbers[1] < 4 * width:
         raise InputError(f"{name} of the GLB has counts and offsets {numbers!r:.80}, which are not valid")
     count, stride, begin, own = numbers
