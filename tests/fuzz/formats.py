@@ -108,6 +108,7 @@ FORMATS = {
     "mitsuba scene": Format(seeds.mitsuba_scene, "a.xml", readers.mitsuba),
     "obj mesh": Format(seeds.mesh, "a.obj", readers.mesh),
     "splats ply": Format(seeds.splats("a.ply"), "a.ply", readers.splats),
+    "splats packed ply": Format(seeds.splats("packed.ply"), "packed.ply", readers.splats),
     "splats splat": Format(seeds.splats("a.splat"), "a.splat", readers.splats),
     "splats spz 2": Format(seeds.splats("a.spz", 2), "a.spz", readers.splats),
     "splats spz 4": Format(seeds.splats("a.spz", 4), "a.spz", readers.splats),

@@ -21,7 +21,7 @@ from scipy.io import savemat
 
 import vcc
 from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, MOVING, PBRT_SCENE
-from tests.sources.splat_bytes import gltf, spz
+from tests.sources.splat_bytes import gltf, packed_ply, spz
 from tests.sources.splat_clouds import cloud
 from vcc.sources.splats import write_ply
 from vcc.store import Lossy, create_video, save_store
@@ -354,7 +354,9 @@ def splats(name: str, version: int = 3) -> Maker:
     """Gaussian splats, by the ending of the file."""
 
     def make(folder: Path) -> None:
-        if name.endswith(".ply"):
+        if name == "packed.ply":
+            (folder / name).write_bytes(packed_ply())
+        elif name.endswith(".ply"):
             write_ply(cloud(20, degree=1), folder / name)
         elif name.endswith(".glb"):
             gltf(folder, name)

@@ -41,6 +41,26 @@ def spz(version: int, degree: int = 1, count: int = 2, flags: int = 1, parts: li
     return head + struct.pack("<BI12x", len(streams), 32) + sizes + b"".join(packed)
 
 
+def packed_ply(degree: int = 1, coloured: bool = True) -> bytes:
+    """300 splats in two chunks of 256, as PlayCanvas compresses them."""
+    ends = [f"{end}_{kind}{axis}" for kind in ("", "scale_") for end in ("min", "max") for axis in "xyz"]
+    ends += [f"{end}_{axis}" for end in ("min", "max") for axis in "rgb"] if coloured else []
+    words = [f"packed_{name}" for name in ("position", "rotation", "scale", "color")]
+    lines = ["ply", "format binary_little_endian 1.0", "element chunk 2", *(f"property float {n}" for n in ends)]
+    lines += ["element vertex 300", *(f"property uint {name}" for name in words)]
+    rest = 3 * ((degree + 1) ** 2 - 1)
+    lines += ["element sh 300", *(f"property uchar f_rest_{n}" for n in range(rest))] if degree else []
+    sizes_and_colours = [-6] * 3 + [-2] * 3 + ([-0.5] * 3 + [1.5] * 3 if coloured else [])
+    chunks = b"".join(
+        struct.pack(f"<{len(ends)}f", *[low] * 3, *[low + 4] * 3, *sizes_and_colours) for low in (-1, 9)
+    )
+    place = 2047 << 21 | 0 << 11 | 1024
+    turn = 2 << 30 | 1023 << 20 | 512 << 10 | 256
+    splat = struct.pack("<4I", place, turn, place, 255 << 24 | 0 << 16 | 51 << 8 | 204)
+    harmonics = bytes([0] * (rest // 3) + [128] * (rest // 3) + [255] * (rest // 3))
+    return "\n".join([*lines, "end_header\n"]).encode() + chunks + splat * 300 + harmonics * 300
+
+
 def gltf(folder: Path, name: str = "a.glb", edit: Any = None, node: Any = None) -> tuple[Path, Splats]:
     """A GLB of a cloud, and the cloud; its JSON can be edited, and its node moved."""
     splats = cloud(7, degree=1)

@@ -8,7 +8,7 @@ import struct
 import numpy as np
 import pytest
 
-from tests.sources.splat_bytes import gltf, spz
+from tests.sources.splat_bytes import gltf, packed_ply, spz
 from vcc import InputError
 from vcc.sources.splats import SplatScene, read_splats, write_ply
 
@@ -63,6 +63,28 @@ def test_ply(tmp_path, degree, order, kind):
     again = read_splats(tmp_path / "b.ply")
     for name in ("positions", "sizes", "rotations", "opacities", "harmonics"):
         assert np.allclose(getattr(again, name), getattr(found, name), rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+@pytest.mark.parametrize("coloured", [False, True])
+def test_compressed_ply(tmp_path, degree, coloured):
+    (tmp_path / "a.ply").write_bytes(packed_ply(degree, coloured))
+    found = read_splats(tmp_path / "a.ply")
+    assert found.degree == degree
+    assert len(found.positions) == 300
+    # all bits of x, none of y and half of z, in the ranges −1 to 3, and 9 to 13 in the second chunk
+    assert np.allclose(found.positions[0], [3, -1, 1], atol=4 / 2047)
+    assert np.allclose(found.positions[-1], [13, 9, 11], atol=4 / 2047)
+    assert np.allclose(np.log(found.sizes), [-2, -6, -4], atol=4 / 2047)
+    # the largest is y (index 2 of w, x, y, z); w = 1/√2, x = 0, z = −1/√2 · 0.5
+    assert np.allclose(found.rotations[:, [0, 1, 3]], [2**-0.5, 0, -(2**-1.5)], atol=2e-3)
+    assert np.allclose(np.linalg.norm(found.rotations, axis=1), 1, atol=1e-5)
+    assert found.rotations[0, 2] > 0
+    low, high = (-0.5, 1.5) if coloured else (0, 1)
+    assert np.allclose(0.5 + C0 * found.harmonics[:, 0], [high, low, low + (high - low) * 51 / 255], atol=1e-5)
+    assert np.allclose(found.opacities, 204 / 255)
+    if degree:  # red, green and blue, three each; 0, 128 and 255 are −4, 0 and 4
+        assert np.allclose(found.harmonics[:, 1:], [[-4, 0, 4]] * 3, atol=4 / 255)
 
 
 def test_splat(tmp_path):
@@ -157,20 +179,24 @@ HUGE[1, fields(0).index("scale_1")] = 200
 @pytest.mark.parametrize(
     ("name", "data", "message"),
     [
-        ("a.ply", other()[:-5], "truncated: its header states 7 splats of 68 bytes, and after it there are 471"),
+        ("a.ply", other()[:-5], "truncated: its header states 7 entries vertex of 68 bytes, and there are 471"),
         ("a.ply", other(count=2**40), "truncated"),
         ("a.ply", other(count=0), "there are no splats"),
         ("a.ply", other(["u", *fields(0)[1:]]), "has no x, which 3D Gaussian splatting writes"),
         ("a.ply", other()[:40], "not a PLY"),
         ("a.ply", other().replace(b"binary_little_endian", b"ascii"), "save it as binary_little_endian"),
+        ("a.ply", other().replace(b"float ny", b"float nx"), "an element or a field of vertex twice"),
         ("a.ply", other().replace(b"property float x", b"property flot x"), 'the line "property flot x"'),
         ("a.ply", other().replace(b"property float x", b"property int x"), "integers"),
         ("a.ply", other().replace(b"float nx", b"float f_rest_0"), "has 1 fields f_rest_"),
         ("a.ply", other(rows=NAN), "1 of 7 splats have invalid positions .* the first is splat 3"),
         ("a.ply", other(rows=ZERO), "1 of 7 splats have no rotation"),
         ("a.ply", other(rows=HUGE), "1 of 7 splats have invalid sizes"),
-        ("a.ply", b"ply\nformat binary_little_endian 1.0\nelement chunk 1\nproperty float a\nelement vertex 1\n"
-         b"property uint packed_position\nend_header\n" + bytes(99), "compressed"),
+        ("a.ply", packed_ply()[:-60], "truncated"),
+        ("a.ply", packed_ply().replace(b"element chunk 2", b"element chunk 1"), "ranges for each 256"),
+        ("a.ply", packed_ply().replace(b"float max_z", b"float mix_z"), "ranges for each 256"),
+        ("a.ply", packed_ply().replace(b"uint packed_scale", b"float packed_scale"), "words for each splat"),
+        ("a.ply", packed_ply().replace(b"uchar f_rest_8", b"uchar f_rest_9"), "9, 24 or 45 bytes"),
         ("a.splat", bytes(33), "with 1 left over"),
         ("a.splat", b"", "no splats"),
         ("a.spz", spz(3)[:-9], "cannot be read as"),

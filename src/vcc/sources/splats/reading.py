@@ -1,6 +1,6 @@
 """Files of Gaussian splats: PLY of 3D Gaussian splatting, .splat, .spz and GLB with KHR_gaussian_splatting.
 
-Sources: the layout of point_cloud.ply in the code release of Kerbl et al. 2023; .splat as the viewer by Kevin Kwok
+Sources: .splat as the viewer by Kevin Kwok
 defines it; the README of nianticlabs/spz for versions 2 to 4; the glTF extension KHR_gaussian_splatting (Khronos,
 ratified). Coordinates stay those of the file.
 """
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, expanded, most_unpacked, read_bytes, reading, unpacked_gzip
-from vcc.files.atomic import atomic_path
 from vcc.sources.splats.cloud import DEGREE_0, HIGHEST_DEGREE, UP_OF_GLTF, Floats, Splats, unit_quaternions
 from vcc.sources.splats.glb import read_glb
+from vcc.sources.splats.ply import read_ply
 
 SPLAT_ENDINGS = (".ply", ".splat", ".spz", ".glb")
 """Supported file extensions."""
@@ -49,117 +49,12 @@ def read_splats(path: str | PathLike[str]) -> Splats:
     check_file(found, "file of splats")
     with reading(found, "Gaussian splats"):
         if ending == ".ply":
-            return _read_ply(found)
+            return read_ply(found)
         if ending == ".splat":
             return _read_splat(found)
         if ending == ".spz":
             return _read_spz(found)
         return read_glb(found)
-
-
-# --- PLY ---
-
-_PLY_TYPES = {
-    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
-    "uint16": "u2", "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4", "float": "f4", "float32": "f4",
-    "double": "f8", "float64": "f8",
-}  # fmt: skip
-_LONGEST_HEADER = 2**16
-_NEEDED = ("x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2", "opacity",
-           *(f"scale_{n}" for n in range(3)), *(f"rot_{n}" for n in range(4)))  # fmt: skip
-
-
-def _read_ply(path: Path) -> Splats:
-    with path.open("rb") as file:
-        head = file.read(_LONGEST_HEADER)
-    order, elements, start = _ply_header(head)
-    if "vertex" not in [name for name, _, _ in elements]:
-        raise InputError("the PLY has no element vertex: it holds no splats")
-    for name, count, fields in elements:
-        if name == "vertex":
-            break
-        if any(kind == "list" for _, kind in fields):
-            raise InputError(f"the PLY has lists in its element {name} before the splats, which is not supported")
-        start += count * sum(np.dtype(kind).itemsize for _, kind in fields)
-    names = [field for field, _ in fields]
-    if "packed_position" in names:
-        raise InputError(
-            "the PLY is compressed (PlayCanvas), which is not supported: convert it with splat-transform to .ply"
-        )
-    missing = [field for field in _NEEDED if field not in names]
-    if missing:
-        kind = "a mesh or points" if "f_dc_0" in missing and "rot_0" in missing else "splats of another kind"
-        raise InputError(
-            f"the PLY has no {', '.join(missing[:4])}{' …' if len(missing) > 4 else ''}, which 3D Gaussian "
-            f"splatting writes: it holds {kind}"
-        )
-    wrong = [field for field, kind in fields if field in _NEEDED and kind not in ("f4", "f8")]
-    if wrong or len(set(names)) < len(names):
-        raise InputError(
-            f"the PLY has integers, lists or a name twice in its fields ({', '.join(wrong or names)})"
-        )
-    layout = np.dtype([(field, order + kind) for field, kind in fields])
-    size = path.stat().st_size
-    if start + count * layout.itemsize > size:
-        raise InputError(
-            f"the PLY is truncated: its header states {count} splats of {layout.itemsize} bytes, and after it "
-            f"there are {max(size - start, 0)} bytes"
-        )
-    rest = sum(field.startswith("f_rest_") for field in names)
-    if rest not in (0, 9, 24, 45) or any(f"f_rest_{n}" not in names for n in range(rest)):
-        raise InputError(
-            f"the PLY has {rest} fields f_rest_…: 0, 9, 24 or 45 for harmonics up to degree 0, 1, 2 or 3"
-        )
-    table = np.memmap(path, layout, "r", start, (count,)) if count else np.zeros(0, layout)
-
-    def columns(*wanted: str) -> Floats:
-        out = np.empty((count, len(wanted)), np.float32)
-        for n, field in enumerate(wanted):
-            out[:, n] = table[field]
-        return out
-
-    harmonics = np.empty((count, 1 + rest // 3, 3), np.float32)
-    for channel in range(3):
-        harmonics[:, 0, channel] = table[f"f_dc_{channel}"]
-        for n in range(rest // 3):  # channel by channel
-            harmonics[:, 1 + n, channel] = table[f"f_rest_{channel * (rest // 3) + n}"]
-    with np.errstate(over="ignore"):  # checked by Splats
-        return Splats(
-            columns("x", "y", "z"),
-            np.exp(columns("scale_0", "scale_1", "scale_2")),
-            unit_quaternions(columns("rot_0", "rot_1", "rot_2", "rot_3")),
-            np.asarray(1 / (1 + np.exp(-columns("opacity")[:, 0])), dtype=np.float32),
-            harmonics,
-        )
-
-
-def _ply_header(head: bytes) -> tuple[str, list[tuple[str, int, list[tuple[str, str]]]], int]:
-    """Byte order, elements as (name, count, fields as (name, type)), and the offset of the data."""
-    end = head.find(b"end_header")
-    newline = head.find(b"\n", end) if end >= 0 else -1
-    if not head.startswith(b"ply") or newline < 0:
-        raise InputError("this is not a PLY: it has no header from ply to end_header")
-    order = ""
-    elements: list[tuple[str, int, list[tuple[str, str]]]] = []
-    for line in head[:end].decode("ascii", "replace").splitlines()[1:]:
-        words = line.split()
-        if not words or words[0] in ("comment", "obj_info"):
-            continue
-        if words[0] == "format" and len(words) > 1:
-            if words[1] == "ascii":
-                raise InputError("the PLY is text (format ascii): save it as binary_little_endian")
-            order = {"binary_little_endian": "<", "binary_big_endian": ">"}.get(words[1], "")
-        elif words[0] == "element" and len(words) == 3 and words[2].isdigit() and len(words[2]) < 16:
-            elements.append((words[1], int(words[2]), []))
-        elif words[0] == "property" and len(words) == 3 and elements and words[1] in _PLY_TYPES:
-            elements[-1][2].append((words[2], _PLY_TYPES[words[1]]))
-        elif words[0] == "property" and len(words) == 5 and elements and words[1] == "list":
-            elements[-1][2].append((words[4], "list"))
-        else:
-            raise InputError(f'the header of the PLY has the line "{line[:60]}", which is not PLY')
-    if not order:
-        raise InputError("the header of the PLY states no format")
-    return order, elements, newline + 1
 
 
 # --- .splat ---
@@ -292,32 +187,3 @@ def _smallest_three(packed: NDArray[np.uint8]) -> Floats:
     rows = np.arange(len(word))
     xyzw[rows, largest] = np.sqrt(np.maximum(1 - np.einsum("ij,ij->i", xyzw, xyzw), 0))
     return unit_quaternions(xyzw[:, [3, 0, 1, 2]])
-
-
-def write_ply(splats: Splats, path: str | PathLike[str]) -> None:
-    """Write splats as a PLY of 3D Gaussian splatting, in single precision.
-
-    Args:
-        splats: opacities are written at least 1e-6 away from 0 and 1, sizes of 0 as 1e-12.
-        path: the file, replaced if it exists. The transfer, the low-pass and the axes are not part of the format.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    rest = splats.harmonics[:, 1:].transpose(0, 2, 1).reshape(len(splats.positions), -1)
-    opacity = np.clip(splats.opacities.astype(np.float64), 1e-6, 1 - 1e-6)
-    named = {
-        **{name: splats.positions[:, n] for n, name in enumerate("xyz")},
-        **{f"f_dc_{n}": splats.harmonics[:, 0, n] for n in range(3)},
-        **{f"f_rest_{n}": rest[:, n] for n in range(rest.shape[1])},
-        "opacity": np.log(opacity / (1 - opacity)),
-        **{f"scale_{n}": np.log(np.maximum(splats.sizes[:, n], 1e-12)) for n in range(3)},
-        **{f"rot_{n}": splats.rotations[:, n] for n in range(4)},
-    }
-    table = np.empty(len(splats.positions), [(name, "<f4") for name in named])
-    for name, values in named.items():
-        table[name] = values
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}"]
-    lines += [*(f"property float {name}" for name in named), "end_header", ""]
-    with atomic_path(path) as part:
-        part.write_bytes("\n".join(lines).encode() + table.tobytes())
