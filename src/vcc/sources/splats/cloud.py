@@ -23,6 +23,7 @@ DEGREE_0 = 0.5 / math.sqrt(math.pi)
 HIGHEST_DEGREE = 3
 UP_OF_GLTF = (0.0, 1.0, 0.0)
 """Upward direction of glTF and .spz by convention; the negative one is that of PLY and .splat."""
+ARRAYS = ("positions", "sizes", "rotations", "opacities", "harmonics")
 LARGEST = 1e9
 """Largest coordinate or size, scene units: squares of these over squares of the smallest fit float64."""
 
@@ -58,6 +59,12 @@ class Splats(Brief):
     up: tuple[float, float, float] = (0.0, -1.0, 0.0)
 
     def __post_init__(self) -> None:
+        for name in ARRAYS:
+            try:
+                values = np.ascontiguousarray(getattr(self, name), dtype=np.float32)
+            except (TypeError, ValueError) as error:
+                raise InputError(f"{name} of splats are an array of numbers: {error}") from None
+            object.__setattr__(self, name, values)
         count = len(self.positions)
         if count == 0:
             raise InputError("there are no splats: the scene is empty")
@@ -128,8 +135,8 @@ class Splats(Brief):
     def digest(self) -> str:
         """SHA-256 of all numbers, hexadecimal."""
         state = hashlib.sha256(repr((self.harmonics.shape, self.transfer, self.antialiased)).encode())
-        for name in ("positions", "sizes", "rotations", "opacities", "harmonics"):
-            state.update(np.ascontiguousarray(getattr(self, name)).data)
+        for name in ARRAYS:
+            state.update(getattr(self, name).data)
         return state.hexdigest()
 
 
