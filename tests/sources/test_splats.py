@@ -21,6 +21,7 @@ from vcc.store import open_store
 
 ARRAY = CameraArray((3, 3), (40, 60), (30 * mm, 40 * mm), (1 / 60, 1 / 50), 2.0)
 TURNED = Viewpoint((0.3, -0.2, -0.4), (0.5, 0.1, 2.0), (0.2, -1.0, 0.1), unit=0.5)
+NAMES = ("positions", "sizes", "rotations", "opacities", "harmonics")
 LOW_PASSES = {"3dgs": (0.3, False), "mip": (0.1, True), "none": (0.0, False)}
 
 
@@ -85,8 +86,7 @@ def inside(splats: Splats, viewpoint: Viewpoint, across: float, down: float) -> 
     """The splats whose centres are within these tangents of the axis."""
     x, y, z = (viewpoint.array_from_scene() @ np.c_[splats.positions, np.ones(len(splats.positions))].T)[:3]
     good = (z < 0) & (abs(x / z) < across) & (abs(y / z) < down)
-    arrays = ("positions", "sizes", "rotations", "opacities", "harmonics")
-    return Splats(*(getattr(splats, name)[good] for name in arrays))
+    return Splats(*(getattr(splats, name)[good] for name in NAMES))
 
 
 @pytest.mark.parametrize("low_pass", LOW_PASSES)
@@ -152,6 +152,16 @@ def test_the_nearer_of_two_hides_the_farther(first):
     assert image[20, 30] == pytest.approx([0.6, 0.4 * 0.1, 0.4 * 0.9], abs=1e-4)
     assert depth[20, 30] == pytest.approx(1.0, abs=1e-5)
     assert left[20, 30] == pytest.approx(0.04, abs=1e-5)
+
+
+def test_splats_that_are_too_near_are_counted():
+    splats = cloud(50)
+    distances = np.sort(splats.positions[:, 2])
+    scene = SplatScene(splats, near=float(distances[7:9].mean()))
+    assert scene.left_out == 8
+    assert np.array_equal(scene.render(ARRAY.camera(1, 1)), SplatScene(
+        Splats(*(getattr(splats, name)[splats.positions[:, 2] > distances[7]] for name in NAMES))
+    ).render(ARRAY.camera(1, 1)))  # fmt: skip
 
 
 def test_colours_are_decoded_after_blending():
@@ -326,8 +336,7 @@ def test_invalid_options(changed, message):
 )
 def test_invalid_numbers(name, value, message):
     good = cloud(5, degree=1)
-    arrays = {each: getattr(good, each).copy() for each in good.__dataclass_fields__ if each not in ("up",)
-              and isinstance(getattr(good, each), np.ndarray)}  # fmt: skip
+    arrays = {each: getattr(good, each).copy() for each in NAMES}
     arrays[name][2] = value
     with pytest.raises(InputError, match=message):
         Splats(**arrays)

@@ -158,6 +158,9 @@ def splats(
     cloud = read_splats(splats)
     viewpoint, field_of_view = standing.viewpoint(cloud)
     scene = SplatScene(cloud, viewpoint, **options)
+    if scene.left_out:
+        count = f"{scene.left_out} of {len(cloud.positions)} splats"
+        show(f"{count} are in front of the views, but nearer than {drawing.near:g} units: left out (--near)")
     cameras = where.array(scene, field_of_view, parallax or 1.0)
     focus = cameras.focus_distance
     converge = "parallel views" if focus == float("inf") else f"views converge at {short(focus, digits=3)}"

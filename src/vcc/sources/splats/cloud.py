@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 
 Floats = NDArray[np.float32]
 Transfer = Literal["srgb", "linear"]
@@ -138,6 +139,23 @@ class Splats(Brief):
         for name in ARRAYS:
             state.update(getattr(self, name).data)
         return state.hexdigest()
+
+
+def degree_kept(degree: int) -> int:
+    """The degree up to which harmonics of a file are read.
+
+    Warns:
+        ResultWarning: the file has more.
+    """
+    if degree > HIGHEST_DEGREE:
+        warnings.warn(
+            ResultWarning(
+                f"the file has harmonics of degree {degree}, which are read up to degree {HIGHEST_DEGREE}: "
+                "colours change less with the direction than they were fitted to"
+            ),
+            stacklevel=5,
+        )
+    return min(degree, HIGHEST_DEGREE)
 
 
 def unit_quaternions(rotations: NDArray[Any]) -> Floats:

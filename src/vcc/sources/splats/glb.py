@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json, value_at
-from vcc.sources.splats.cloud import HIGHEST_DEGREE, UP_OF_GLTF, Splats, unit_quaternions
+from vcc.sources.splats.cloud import UP_OF_GLTF, Splats, degree_kept, unit_quaternions
 
 EXTENSION = "KHR_gaussian_splatting"
 _SRGB, _LINEAR = "srgb_rec709_display", "lin_rec709_display"
@@ -56,10 +56,9 @@ def read_glb(path: Path) -> Splats:
         return _values(tree, binary, attributes, name, width)
 
     degree = 0
-    while (
-        degree < HIGHEST_DEGREE and value_at(attributes, f"{EXTENSION}:SH_DEGREE_{degree + 1}_COEF_0") is not None
-    ):
+    while f"{EXTENSION}:SH_DEGREE_{degree + 1}_COEF_0" in (attributes or ()):
         degree += 1
+    degree = degree_kept(degree)
     names = [f"{EXTENSION}:SH_DEGREE_{l}_COEF_{n}" for l in range(degree + 1) for n in range(2 * l + 1)]
     harmonics = [of(name, 3) for name in names]
     if len({len(each) for each in harmonics}) > 1:

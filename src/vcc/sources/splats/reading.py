@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, expanded, most_unpacked, read_bytes, reading, unpacked_gzip
-from vcc.sources.splats.cloud import DEGREE_0, HIGHEST_DEGREE, UP_OF_GLTF, Floats, Splats, unit_quaternions
+from vcc.sources.splats.cloud import DEGREE_0, UP_OF_GLTF, Floats, Splats, degree_kept, unit_quaternions
 from vcc.sources.splats.glb import read_glb
 from vcc.sources.splats.ply import read_ply
 
@@ -112,7 +112,7 @@ def _read_spz(path: Path) -> Splats:
     for axis in range(3):
         low, middle, high = (place[:, 3 * axis + n].astype(np.int32) for n in range(3))
         positions[:, axis] = ((low | middle << 8 | high << 16) << 8 >> 8) / 2.0**fraction
-    kept = min(degree, HIGHEST_DEGREE)
+    kept = degree_kept(degree)
     harmonics = np.empty((count, (kept + 1) ** 2, 3), np.float32)
     harmonics[:, 0] = (colour / 255 - 0.5) / _COLOUR_SCALE
     harmonics[:, 1:] = (rest_of.reshape(count, rest, 3)[:, : (kept + 1) ** 2 - 1].astype(np.float32) - 128) / 128

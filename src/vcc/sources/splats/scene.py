@@ -58,6 +58,9 @@ class SplatScene:
         near: splats whose centre is nearer to the entrance plane are not drawn, scene units.
         threads: number of threads; None uses all cores.
 
+    Attributes:
+        left_out: number of splats in front of the array that are nearer than ``near``, wherever they are.
+
     Raises:
         InputError: a file that cannot be read, an invalid option, or no splat in front of the array.
     """
@@ -95,6 +98,7 @@ class SplatScene:
                 f"all {len(depth)} splats are behind the array or nearer than {near:g} scene units: move the "
                 "viewpoint's eye or target, or pass a smaller near"
             )
+        self.left_out = int(((depth > 0) & (depth <= self._near)).sum())
         self._order = np.argsort(depth, kind="stable").astype(np.int32)
         self._placed = np.empty((len(depth), 9))
         kernels.placed(cloud.positions, cloud.sizes, cloud.rotations, self._order, matrix, self._placed)
