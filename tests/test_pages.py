@@ -6,6 +6,7 @@ notebooks hold what notebooks hold, which `tests/test_notebooks.py` runs.
 """
 
 import contextlib
+import json
 import re
 import shlex
 import shutil
@@ -189,6 +190,14 @@ def write_given():
         Path(f"cotton/view_{row}_{column}.png").unlink()
     for name in ("camera.toml", "other.toml"):
         Path(name).write_text(CAMERA)
+    pose = {
+        "img_name": "front",
+        "width": 480,
+        "fx": 963,
+        "position": [0, 0, 0],
+        "rotation": np.diag([1, -1, -1]).tolist(),
+    }
+    Path("cameras.json").write_text(json.dumps([pose]))
     write_depths()
     write_raw()
 

@@ -78,6 +78,7 @@ BY_NAME = {
     "store.compression": "a codec is a class of Zarr's, which takes long to load",
     "sources.planes": "pictures of planes are mixed by compiled loops",
     "sources.depth_map": "meshes are made by compiled loops",
+    "sources.splats.scene": "splats are drawn by compiled loops",
     "engines": "an engine is loaded when it is first used: Numba takes a second",
     "run.drive": "views in between need Numba",
     "run.operator": "deepinv, and PyTorch with it, is loaded when it is asked for",

@@ -21,6 +21,9 @@ from scipy.io import savemat
 
 import vcc
 from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, MOVING, PBRT_SCENE
+from tests.sources.splat_bytes import gltf, packed_ply, spz
+from tests.sources.splat_clouds import cloud
+from vcc.sources.splats import write_ply
 from vcc.store import Lossy, create_video, save_store
 
 Maker = Callable[[Path], Any]
@@ -345,3 +348,29 @@ def mesh(folder: Path) -> None:
     )
     (folder / "a.mtl").write_text("newmtl m\nKd 1 1 1\nmap_Kd t.png\n")
     picture(folder / "t.png", scene()[0, 0])
+
+
+def splats(name: str, version: int = 3) -> Maker:
+    """Gaussian splats, by the ending of the file."""
+
+    def make(folder: Path) -> None:
+        if name == "packed.ply":
+            (folder / name).write_bytes(packed_ply())
+        elif name.endswith(".ply"):
+            write_ply(cloud(20, degree=1), folder / name)
+        elif name.endswith(".glb"):
+            gltf(folder, name)
+        elif name.endswith(".spz"):
+            (folder / name).write_bytes(spz(version))
+        else:
+            (folder / name).write_bytes(
+                struct.pack("<6f4B4B", 1, 2, 3, 0.1, 0.2, 0.3, 255, 0, 51, 204, 255, 0, 0, 0) * 5
+            )
+
+    return make
+
+
+POSES = """{"w": 800, "h": 600, "fl_x": 400.5, "frames": [{"file_path": "images/a.jpg", "transform_matrix":
+[[0.0, 0.0, -1.0, 1.5], [0.0, 1.0, 0.0, 2.5], [1.0, 0.0, 0.0, 3.5], [0.0, 0.0, 0.0, 1.0]]}]}"""
+CAMERAS = """[{"id": 0, "img_name": "a", "width": 800, "height": 600, "fx": 400.5, "fy": 400.5, "position":
+[1.5, 2, 3], "rotation": [[0, 0, 1], [0, -1, 0], [1, 0, 0]]}]"""

@@ -132,6 +132,21 @@ class StoreWriter:
             difference = kept_as.astype(np.float64) - view
             self._errors[row, column] = float(np.mean(difference * difference))
 
+    def write_disparity(self, maps: DisparityMaps) -> None:
+        """Write disparity maps next to the samples, if there are none yet.
+
+        Args:
+            maps: the maps, with their source.
+
+        Raises:
+            InputError: the write fails.
+        """
+        try:
+            keep_maps(self.path, maps)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"the disparities could not be written to {self.path}: {reason}") from error
+
     def finish(self) -> StoredLightField:
         """Mark the store as complete and open it.
 
@@ -432,14 +447,7 @@ def write_all(
         writer.write_view(j, i, view(j, i))
         tell(progress, done, total)
     if disparity is not None:
-        _keep(writer.path, disparity)
-
-
-def _keep(part: Path, disparity: DisparityMaps) -> None:
-    try:
-        keep_maps(part, disparity)
-    except OSError as error:
-        raise InputError(f"the disparities could not be written to {part}: {error.strerror or error}") from error
+        writer.write_disparity(disparity)
 
 
 def _check(folder: Path, shape: tuple[int, ...], kind: np.dtype[Any], transfer: str, packing: Compression) -> None:
