@@ -161,7 +161,7 @@ def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
 
     views = Views(view, (there[0], there[1]), stored.frame, "linear")
     if missing:
-        lines["missing"] = _missing(sorted(missing), there[0] * there[1])
+        lines["missing"] = _missing(sorted(missing), there[0] * there[1], "write them")
     if not quick and len(missing) < there[0] * there[1]:
         lines |= _light(views)
     if picture is not None:
@@ -222,7 +222,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         keep = "; with --keep they are kept in the folder" if facts.files else ""
         lines["assumed"] = f"distances and blur depend on these assumptions: give {options} if you know them{keep}"
     if facts.missing:
-        lines["missing"] = _missing(facts.missing, facts.rows * facts.columns)
+        lines["missing"] = _missing(facts.missing, facts.rows * facts.columns, _FILLED)
     if facts.disparity_range is not None:
         low, highest = facts.disparity_range
         lines["disparities"] = f"{low:.3g} to {highest:.3g} pixels per view (stated)"
@@ -231,14 +231,19 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
     return lines
 
 
-def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
+_FILLED = (
+    "add them, or pass --missing fill, which renders them from the others by depth and estimates the error, or "
+    "--missing dark"
+)
+
+
+def _missing(places: Iterable[tuple[int, int]], total: int, way_out: str) -> str:
     missing = list(places)
     named = ", ".join(f"({row}, {column})" for row, column in missing[:_NAMED_AT_MOST])
     more = ", …" if len(missing) > _NAMED_AT_MOST else ""
     return (
         f"{len(missing)} of the {total} views, by (row, column): {named}{more}. A capture "
-        "raises an error, as it needs all views: add them, or open the others in Python with "
-        "vcc.formats.open_sparse_views"
+        f"raises an error: {way_out}"
     )
 
 
