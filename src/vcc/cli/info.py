@@ -20,9 +20,10 @@ from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, g
 from vcc.cli.store_words import looked_at, places_of, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
-from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
+from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, open_unstructured, read_geometry
 from vcc.formats.dark_views import dark_words, mean_light
 from vcc.formats.lytro_lfp import read_lytro
+from vcc.formats.unstructured import recognised as has_poses
 from vcc.light_field import LightField
 from vcc.store import is_store, is_video, open_store, open_video
 
@@ -73,7 +74,12 @@ def describe(
         what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
         raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
     with reading(path, "a light field"):
-        if lytro_lfp.recognised(path):
+        if has_poses(path):
+            if given or picture is not None:
+                what = "photographs with poses, which state their cameras"
+                raise InputError(f"{path} is {what}: leave out {', '.join(given or ['--picture'])}")
+            lines = open_unstructured(path).facts()
+        elif lytro_lfp.recognised(path):
             if picture is not None:
                 raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
             lines = _lytro_facts(path)
