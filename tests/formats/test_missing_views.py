@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import vcc
 from vcc.base.errors import InputError, ResultWarning
 from vcc.files import transfer
-from vcc.formats import SparseViews, open_light_field, open_sparse_views, save_light_field
+from vcc.formats import SparseViews, open_light_field, save_light_field
 from vcc.store import open_store, save_store
 from vcc.units import mm
 
@@ -77,10 +77,11 @@ def test_missing_views_are_those_of_the_scene(name: str) -> None:
     assert np.array_equal(filled.given, there)
     assert np.array_equal(filled.values[there], views[there])
     assert filled.filling is not None
-    assert (filled.filling.error[there] == 0).all() and (filled.filling.unseen[there] == 0).all()
+    assert (filled.filling.error[there] == 0).all()
+    assert (filled.filling.unseen[there] == 0).all()
     error = np.sqrt(((filled.values - views) ** 2).mean(axis=(2, 3)))[~there]
-    # The board's border, 100 pixels long, is found to a pixel: in a ring of a pixel on either side the other texture
-    # may be shown. Both have a standard deviation of √6/30 = 0.082.
+    # The board's border, 100 pixels long, is found to a pixel: in a ring of a pixel on either side the other
+    # texture may be shown. Both have a standard deviation of √6/30 = 0.082.
     assert error.max() < math.sqrt(2) * 0.082 * math.sqrt(200 / SIZE**2)
     # The estimate is of the same kind of error, from views that are as far apart or farther.
     expected = filled.filling.error[~there]
@@ -135,9 +136,11 @@ def test_folders_with_holes(tmp_path: Path) -> None:
     assert np.abs(filled.values - views)[~there].mean() < 0.01
     with pytest.warns(ResultWarning, match="not recorded, and dark, are 8 of the 25 views"):
         dark = open_light_field(folder, missing="dark", **CAMERAS)
-    assert (dark.values[~there] == 0).all() and np.array_equal(dark.given, there)
+    assert (dark.values[~there] == 0).all()
+    assert np.array_equal(dark.given, there)
     low, high = dark.measured_disparity_range() or (0, 0)  # of the views that are there
-    assert abs(low - FAR) < 0.2 and abs(high - NEAR) < 0.2
+    assert abs(low - FAR) < 0.2
+    assert abs(high - NEAR) < 0.2
     with pytest.raises(InputError, match="missing is"):
         open_light_field(folder, missing="guess", **CAMERAS)  # type: ignore[arg-type]
     # Rows that run upwards are found by parallax, as in complete grids.
@@ -169,7 +172,8 @@ def test_every_reader_is_told_which_views_were_filled(tmp_path: Path) -> None:
     said = " ".join(camera.explain(filled).split())
     assert "rendered from the others by depth, are 16 of the 25 views" in said
     complete = vcc.LightField(views, filled.frame)
-    assert complete.given.all() and complete.filling is None
+    assert complete.given.all()
+    assert complete.filling is None
 
 
 def test_integers_stay_integers() -> None:
@@ -188,7 +192,7 @@ def test_one_view_cannot_fill_a_grid() -> None:
 
 
 def test_cameras_wider_than_a_row_of_views_report_the_missing_light() -> None:
-    """A row stands for one cell of the aperture in height: a round lens of 5 cells asks for light above and below."""
+    """A row stands for one cell of the aperture in height: a round lens of 5 cells needs light above it."""
     views, _ = board_before_wall(1, 5)
     row = vcc.LightField.from_views(views[..., 20:50, 20:50], 2 * mm, 1e-3)
     camera = vcc.Camera(

@@ -221,6 +221,11 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "views are": ("parallel" if math.isinf(focus) else f"converge {short(focus)} away")
         + assumed("focus_distance"),
     }
+    if facts.off_grid is not None:
+        rows, columns = facts.off_grid
+        lines["positions"] = (
+            f"{rows:.2g} (rows) and {columns:.2g} (columns) of a step off an even grid, by the names"
+        )
     if facts.metadata.said:
         lines["numbers"] = f"{facts.metadata.in_words}, as the pictures state"
     if facts.unknown:

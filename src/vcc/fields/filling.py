@@ -17,7 +17,7 @@ from vcc.base.words import first_few
 from vcc.fields.sampled import as_slice
 
 Missing = Literal["refuse", "fill", "dark"]
-"""What to do with views that are missing in a grid: raise an error, render them from the others, or leave them dark."""
+"""Views missing in a grid: raise an error, render them from the others, or leave them dark."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,7 +94,8 @@ class Filling(Value, Brief):
         rms = math.sqrt(float(np.mean(known**2))) if known.size else math.nan
         error = f"{rms:.2g} of full scale" if known.size else "unknown: too few views to test"
         worst = f", at most {known.max():.2g}" if known.size else ""
-        return f"{said}. Estimated error (root mean square): {error}{worst}; {self.unseen[made].mean():.2%} of their pixels no view shows"
+        share = f"{self.unseen[made].mean():.2%} of their pixels no view shows"
+        return f"{said}. Estimated error (root mean square): {error}{worst}; {share}"
 
 
 def filling_of(given: ArrayLike, error: ArrayLike, unseen: ArrayLike) -> Filling:

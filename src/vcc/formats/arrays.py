@@ -22,8 +22,8 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.wavelengths import wavelengths as all_checked
-from vcc.fields.grid import Sample
 from vcc.fields.filling import Filling
+from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path

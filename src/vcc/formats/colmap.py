@@ -1,7 +1,7 @@
 """Photographs with poses of COLMAP: ``cameras``, ``images`` and ``points3D``, as text or binary.
 
-The format is documented at https://colmap.github.io/format.html. A pose maps the world to the camera, x to the right,
-y down and z into the scene: X_camera = R·X + t, R from the quaternion (w, x, y, z).
+The format is documented at https://colmap.github.io/format.html. A pose maps the world to the camera, x to the
+right, y down and z into the scene: X_camera = R·X + t, R from the quaternion (w, x, y, z).
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Camera models of photographs: from directions to pixels, with the distortion of the lens.
 
 The models and names of their parameters are those of COLMAP (https://colmap.github.io/cameras.html), which include
-OpenCV's (Brown 1966; Kannala and Brandt 2006; Devernay and Faugeras 2001). With x and y the tangents of a direction
-to the right and downwards, a model distorts (x, y); pixels are then fx·x + cx and fy·y + cy, where the centre of the
-upper left pixel is (0.5, 0.5).
+OpenCV's (Brown 1966; Kannala and Brandt 2006; Devernay and Faugeras 2001). With x and y the tangents of a
+direction to the right and downwards, a model distorts (x, y); pixels are then fx·x + cx and fy·y + cy, where the
+centre of the upper left pixel is (0.5, 0.5).
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class LensModel(Brief):
         if self.model not in MODELS or self.model in _UNSUPPORTED:
             known = ", ".join(name for name in MODELS if name not in _UNSUPPORTED)
             raise InputError(
-                f"the camera model {self.model} is not supported: {known} are. Undistort the photographs first (colmap "
+                f"the camera model {self.model} is not supported: {known} are. Undistort the photographs first "
+                "(colmap "
                 "image_undistorter writes pictures of PINHOLE cameras)"
             )
         if not (0 < self.width <= _LARGEST_PICTURE and 0 < self.height <= _LARGEST_PICTURE):
@@ -103,8 +104,8 @@ class LensModel(Brief):
     def pixels(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Pixels (column, row), counted from the border of the picture; NaN where the model ends.
 
-        A distortion is used up to the angle at which its radius begins to shrink: beyond it, a polynomial folds the
-        scene back into the picture.
+        A distortion is used up to the angle at which its radius begins to shrink: beyond it, a polynomial folds
+        the scene back into the picture.
 
         Args:
             x: tangents of directions to the right of the axis.

@@ -88,6 +88,8 @@ def _lens(given: dict[str, Any], file: Path, where: str) -> LensModel:
     centre = {"cx": number("cx", width / 2), "cy": number("cy", height / 2)}
     names = ("k1", "k2", "k3", "k4") if model == "OPENCV_FISHEYE" else ("k1", "k2", "k3", "p1", "p2")
     if model != "OPENCV_FISHEYE" and number("k4", 0.0) != 0:
-        raise InputError(f"{where}: k4 of the camera model {model} is not supported: undistort the photographs first")
+        raise InputError(
+            f"{where}: k4 of the camera model {model} is not supported: undistort the photographs first"
+        )
     bent = {name: number(name, 0.0) for name in names}
     return LensModel(_MODELS.get(model, str(model)), width, height, {"fx": fx, "fy": fy, **centre, **bent})

@@ -61,7 +61,9 @@ class Photographs(Brief):
 
     def __post_init__(self) -> None:
         if len(self.photographs) < 2:
-            raise InputError(f"{self.path} has {len(self.photographs)} photographs with poses: two or more are needed")
+            raise InputError(
+                f"{self.path} has {len(self.photographs)} photographs with poses: two or more are needed"
+            )
 
 
 def picture_file(folder: Path, name: str, where: str, anywhere: bool) -> Path:

@@ -29,7 +29,7 @@ from vcc.formats.dark_views import dark_notice
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
-from vcc.formats.notices import assumed_notice, overruled_notice, vergence_notice
+from vcc.formats.notices import assumed_notice, off_grid_notice, overruled_notice, vergence_notice
 from vcc.formats.orders import Order
 from vcc.formats.orientation import Moved, OrientationChoice, look, looked_at, places_after, rearranged
 from vcc.formats.reading_views import read_views
@@ -424,7 +424,8 @@ def _put_in_order(
     assumed = [name for name in info.unknown if name not in given.names]
     vergence = vergence_notice(_shown(light_field, seen)) if cameras.are_parallel else ""
     said = (assumed_notice(info, path, opened.geometry, assumed), overruled_notice(info, given))
-    return light_field, (*remarks, *said, vergence)
+    off = off_grid_notice(info, _shown(light_field, seen)) if info.off_grid is not None else ""
+    return light_field, (*remarks, *said, vergence, off)
 
 
 def _shown(light_field: LightField, seen: _Seen) -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""Views of an incomplete grid, and light fields from them: of a complete part, or with the missing views filled."""
+"""Views of an incomplete grid, and light fields from them: of a complete part, or with missing views filled."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class SparseViews(Brief):
         """The light field of the whole grid; ``given`` and ``filling`` report which views were not recorded.
 
         Args:
-            missing: "fill" renders missing views from the others. Disparities are found for up to five views by
+            missing: "fill" renders missing views from the others. Disparities are found for up to three views by
                 plane sweeps (docs/depth.md), and a view takes each pixel from the nearest view that shows it.
                 The error is estimated by rendering recorded views from the others in the same way (up to 40 of
                 them); missing views that are farther from the nearest recorded one have proportionally larger

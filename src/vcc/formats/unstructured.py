@@ -1,8 +1,8 @@
 """Light fields from photographs with poses: cameras near one plane, looking the same way, resampled onto a grid.
 
 Each photograph is undistorted and turned onto the common axes (exact: a turn about the camera's own place needs no
-depth). Its distance from the plane is corrected as for the scene's mean distance. Views of the grid are then rendered
-by `vcc.run.scattered_views`.
+depth). Its distance from the plane is corrected as for the scene's mean distance. Views of the grid are then
+rendered by `vcc.run.scattered_views`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
-from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
@@ -45,7 +44,10 @@ _ALIKE, _STEEPEST = math.radians(60), math.radians(45)
 """Angles to the mean direction of view: of the cameras, on average, and of the normal of their plane."""
 _ALONG_A_LINE = 0.05  # height over width of the cameras' places, below which they are one row
 _OUTERMOST = (1, 99)  # per cent of the points whose distances count: the others are often wrong
-_LESS_NEAR, _FARTHER = 0.9, 1.25  # factors of the nearest and farthest distance: points do not cover all of a scene
+_LESS_NEAR, _FARTHER = (
+    0.9,
+    1.25,
+)  # factors of the nearest and farthest distance: points do not cover all of a scene
 _MOST_VIEWS = 4096
 _WAY_OUT = (
     "Light fields need cameras near one plane that look the same way: leave the others out, or make a Gaussian "
@@ -80,7 +82,7 @@ class CameraPlane(Brief):
         return float(height), float(width)
 
     def grid(self) -> tuple[tuple[int, int], tuple[float, float]]:
-        """((rows, columns), (dv, du)): the grid over the cameras' extent with about as many views as photographs."""
+        """((rows, columns), (dv, du)): over the cameras' extent, with about as many views as cameras."""
         (height, width), n = self.extent, len(self.places)
         longer, shorter = max(height, width), min(height, width)
         if longer == 0:
@@ -97,11 +99,13 @@ class CameraPlane(Brief):
     def off_grid(self, views: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """Distance of each camera from the nearest view of a grid, in steps of the grid along v and u, (n, 2)."""
         steps = self.in_grid(views, spacing)
-        return steps - np.clip(np.round(steps), 0, np.subtract(views, 1))
+        off: Array = steps - np.clip(np.round(steps), 0, np.subtract(views, 1))
+        return off
 
     def in_grid(self, views: tuple[int, int], spacing: tuple[float, float]) -> Array:
         """(row, column) of each camera in a grid centred on the cameras' extent, (n, 2); fractions."""
-        return self.places[:, ::-1] / np.array(spacing) + (np.array(views) - 1) / 2
+        steps: Array = self.places[:, ::-1] / np.array(spacing) + (np.array(views) - 1) / 2
+        return steps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,8 +163,8 @@ class UnstructuredViews(Brief):
     def off_plane_pixels(self, distances: tuple[float, float]) -> Array:
         """Error of each view by its camera's distance from the plane, pixels at the border, (n,).
 
-        A camera that is δ nearer enlarges an object at Z by 1/(1 − δ/Z). This is corrected for the mean of 1/Z; of the
-        others, an object at the border is off by δ·|1/Z − mean|·half the width in pixels.
+        A camera that is δ nearer enlarges an object at Z by 1/(1 − δ/Z). This is corrected for the mean of 1/Z;
+        other objects at the border are off by δ·|1/Z − mean|·half the width in pixels.
 
         Args:
             distances: (nearest, farthest) of the scene, metres.
@@ -188,7 +192,9 @@ class UnstructuredViews(Brief):
         height, width = plane.extent
         rms = math.sqrt(float(np.mean(plane.off**2)))
         lines["cameras span"] = f"{short(width)} × {short(height)} (width × height)"
-        lines["off their plane"] = f"{short(rms)} (root mean square), at most {short(float(np.abs(plane.off).max()))}"
+        lines["off their plane"] = (
+            f"{short(rms)} (root mean square), at most {short(float(np.abs(plane.off).max()))}"
+        )
         lines["turned"] = f"up to {math.degrees(plane.turned.max()):.3g}° from the plane's normal"
         off = np.sqrt((plane.off_grid(views, spacing) ** 2).mean(axis=0))
         lines["nearest grid"] = (
@@ -199,9 +205,13 @@ class UnstructuredViews(Brief):
             return lines | {"scene": "its distances are not stated: on_grid needs distances=(nearest, farthest)"}
         near, far = plane.distances
         lines["scene"] = f"{short(near)} to {short(far)} away (by the points of the file)"
-        error = math.sqrt(float(np.mean(self.off_plane_pixels(plane.distances) ** 2)))
-        fit = "on a grid by vcc.formats.open_unstructured(…).on_grid()" if error <= OFF_PLANE else f"no light field. {_WAY_OUT}"
-        lines["light field"] = f"distances from the plane cost {error:.2g} pixels at the borders of views: {fit}"
+        cost = math.sqrt(float(np.mean(self.off_plane_pixels(plane.distances) ** 2)))
+        fit = (
+            "on a grid by vcc.formats.open_unstructured(…).on_grid()"
+            if cost <= OFF_PLANE
+            else f"no light field. {_WAY_OUT}"
+        )
+        lines["light field"] = f"distances from the plane cost {cost:.2g} pixels at the borders of views: {fit}"
         return lines
 
     def on_grid(
@@ -218,9 +228,9 @@ class UnstructuredViews(Brief):
     ) -> LightField:
         """A light field on a planar grid of views, rendered from the photographs by depth.
 
-        Disparities are found by plane sweeps of up to five photographs; each view takes its pixels from the nearest
-        photographs that show them (docs/depth.md). ``given`` is True for views that are within 0.1 pixels of a
-        photograph (which is resampled onto the grid's pixels); ``filling`` has the estimated errors of the others,
+        Disparities are found by plane sweeps of up to three photographs; each view takes its pixels from the
+        nearest photographs that show them (docs/depth.md). ``given`` is True for views that are within 0.1 pixels of
+        a photograph (resampled onto the grid's pixels); ``filling`` has the estimated errors of the others,
         and the share of pixels that no photograph shows, which is 0 beyond the photographs' borders.
 
         Args:
@@ -248,7 +258,10 @@ class UnstructuredViews(Brief):
         errors = self.off_plane_pixels((near, far))
         scale = 1.0
         lenses = [one.lens for one in self.photographs.photographs]
-        height, width = (round(float(np.median(size))) for size in zip(*((one.height, one.width) for one in lenses), strict=True))
+        height, width = (
+            round(float(np.median(size)))
+            for size in zip(*((one.height, one.width) for one in lenses), strict=True)
+        )
         if pixels is not None:
             checks.counts("pixels", pixels, "rows", "columns")
             scale = pixels[1] / width
@@ -269,7 +282,12 @@ class UnstructuredViews(Brief):
         grid = Grid(shape, frame, np.dtype(np.float32), disparity_range=disparities)  # type: ignore[arg-type]
         n = len(self)
         needed = 4 * height * width * (5 * n + 3 * views[0] * views[1])
-        check_memory(needed, memory_limit, f"{n} photographs of {height}×{width} pixels", "pass pixels=(rows, columns), a smaller size")
+        check_memory(
+            needed,
+            memory_limit,
+            f"{n} photographs of {height}×{width} pixels",
+            "pass pixels=(rows, columns), a smaller size",
+        )
         pictures = np.empty((n, height, width, 4), np.float32)
         for number, one in enumerate(self.photographs.photographs):
             pictures[number] = _rectified(one, plane, number, grid, mean_distance, scale)
@@ -277,7 +295,8 @@ class UnstructuredViews(Brief):
         covered = pictures[..., 3].mean(axis=(1, 2))
         if covered.mean() < 0.5:
             raise InputError(
-                f"{path}: turned onto common axes, the photographs show {covered.mean():.0%} of a common field of view. {_WAY_OUT}"
+                f"{path}: turned onto common axes, the photographs show {covered.mean():.0%} of a common field of "
+                f"view. {_WAY_OUT}"
             )
         places = plane.in_grid(views, spacing)
         scattered = ScatteredViews(pictures, places, grid, covered=True, memory_limit=memory_limit)
@@ -321,7 +340,10 @@ class UnstructuredViews(Brief):
             checks.counts("views", views, "rows", "columns")
             down, right = (length / max(n - 1, 1) for length, n in zip((height, width), views, strict=True))
             longer = max(down if views[0] > 1 else 0.0, right if views[1] > 1 else 0.0) or max(apart)
-            apart = (down if views[0] > 1 and down > 0 else longer, right if views[1] > 1 and right > 0 else longer)
+            apart = (
+                down if views[0] > 1 and down > 0 else longer,
+                right if views[1] > 1 and right > 0 else longer,
+            )
         if spacing is not None:
             down, right = pair(spacing)
             apart = checks.above_zero("spacing", down), checks.above_zero("spacing", right)
@@ -329,7 +351,9 @@ class UnstructuredViews(Brief):
                 suggested = (math.floor(height / apart[0] + 1e-6) + 1, math.floor(width / apart[1] + 1e-6) + 1)
         chosen = suggested if views is None else views
         if chosen[0] * chosen[1] > _MOST_VIEWS:
-            raise InputError(f"a grid of {chosen[0]}×{chosen[1]} views: at most {_MOST_VIEWS} are made. Pass a larger spacing")
+            raise InputError(
+                f"a grid of {chosen[0]}×{chosen[1]} views: at most {_MOST_VIEWS} are made. Pass a larger spacing"
+            )
         return chosen, apart
 
 
@@ -390,7 +414,7 @@ def recognised(path: Path) -> Path | None:
 def _rectified(
     one: Photograph, plane: CameraPlane, number: int, grid: Grid, distance: float, scale: float
 ) -> NDArray[np.float32]:
-    """A photograph on the pixels of a view of the grid at its place, times its coverage, and the coverage, (t, s, 4).
+    """A photograph on the grid's pixels, times its coverage, and the coverage as the last channel, (t, s, 4).
 
     Args:
         one: the photograph.
@@ -406,8 +430,8 @@ def _rectified(
     lens = one.lens
     if picture.shape[:2] != (lens.height, lens.width):
         raise InputError(
-            f"{one.file} has {picture.shape[1]}×{picture.shape[0]} pixels, and its camera {lens.width}×{lens.height}: "
-            "pass the folder of the original pictures as images=…"
+            f"{one.file} has {picture.shape[1]}×{picture.shape[0]} pixels, and its camera {lens.width}×"
+            f"{lens.height}: pass the folder of the original pictures as images=…"
         )
     light = decode(picture) if bits < 32 else picture.astype(np.float32)
     light = np.repeat(light[..., None], 3, axis=2) if light.ndim == 2 else light[..., :3]
@@ -417,7 +441,11 @@ def _rectified(
     light = averaged(light, finer) if finer > 1 else light
     rows, columns = grid.shape[2:4]
     x, y = plane.places[number]
-    ps, pt, vergence = -grid.frame.linear[2, 2], -grid.frame.linear[3, 3], grid.frame.linear[2, 0] / grid.frame.linear[0, 0]
+    ps, pt, vergence = (
+        -grid.frame.linear[2, 2],
+        -grid.frame.linear[3, 3],
+        grid.frame.linear[2, 0] / grid.frame.linear[0, 0],
+    )
     right = (np.arange(columns) - (columns - 1) / 2) * ps - x * vergence
     down = (np.arange(rows) - (rows - 1) / 2) * pt - y * vergence
     nearer = distance / (distance - plane.off[number])
@@ -429,7 +457,7 @@ def _rectified(
     column, row = lens.pixels(across, below)
     # COLMAP counts pixels from the border: the middle of the first is at 0.5.
     where = np.stack([row, column]) / finer - 0.5
-    inside = np.isfinite(where).all(axis=0)
+    inside: NDArray[np.bool_] = np.asarray(np.isfinite(where).all(axis=0))
     for axis in (0, 1):
         inside &= (where[axis] > -0.5) & (where[axis] < light.shape[axis] - 0.5)
     where = np.where(inside, where, 0)

@@ -266,7 +266,8 @@ def _words(grid: Grid, path: Path, more: str) -> str:
 def _warn_of_filling(grid: Grid, path: Path, kind: Kind) -> None:
     if grid.filling is not None and grid.filling.words and kind not in ("zarr", "npz"):
         warnings.warn(
-            f"{path}: the format does not keep which views were recorded ({(~grid.given).sum()} of {grid.given.size} "
+            f"{path}: the format does not keep which views were recorded ({(~grid.given).sum()} of "
+            f"{grid.given.size} "
             "were not): .zarr and .npz do",
             ResultWarning,
             stacklevel=3,

@@ -28,7 +28,7 @@ from vcc.plan.how import cores
 
 Array = NDArray[np.float32]
 
-SWEEPS = 5
+SWEEPS = 3
 """Largest number of views whose disparities are found; the others are given those of the nearest one, moved."""
 ON_A_SIDE = 4
 """Largest number of views on each side that a view is compared with."""
@@ -67,7 +67,8 @@ class ScatteredViews:
     ) -> None:
         if len(pictures) < 2:
             raise InputError(
-                "one view has no parallax, so that no other can be made from it: vcc synth depth makes a light field "
+                "one view has no parallax, so that no other can be made from it: vcc synth depth makes a "
+                "light field "
                 "of one picture and its depth map"
             )
         self._parallax = Parallax.of(grid.frame)
@@ -130,7 +131,8 @@ class ScatteredViews:
         low, high = ends_of(self._sweep(self.swept[0], tried, factor))
         if not low <= high:
             raise InputError(
-                "the range of disparities cannot be measured (too little texture): give disparity_range=(low, high)"
+                "the range of disparities cannot be measured (too little texture): give disparity_range=(low, "
+                "high)"
             )
         margin = MARGIN + _WIDER * factor * (high - low)
         return factor * low - margin, factor * high + margin
@@ -162,12 +164,12 @@ class ScatteredViews:
 
     def _nearness_of(self, number: int) -> Array:
         """sign · disparity of a view: found, or that of the nearest one as seen from its place."""
-        from vcc.engines.depth_views import seen_from
-
         if number not in self._nearness:
             known = min(self.swept, key=lambda n: float(np.linalg.norm(self.places[n] - self.places[number])))
             down, across = self.places[number] - self.places[known]
-            self._nearness[number] = seen_from(self._parallax, self._nearness[known], (down, across), cores())
+            self._nearness[number] = lazy_import.module("vcc.engines.depth_views").seen_from(
+                self._parallax, self._nearness[known], (down, across), cores()
+            )
         return self._nearness[number]
 
     # --- views ---
@@ -181,8 +183,7 @@ class ScatteredViews:
             place: (row, column) in the grid.
             without: number of a view that is not used.
         """
-        from vcc.engines.depth_views import Looking, seen_as
-
+        engine = lazy_import.module("vcc.engines.depth_views")
         away = np.array(place, float) - self.places
         distances = np.linalg.norm(away, axis=1)
         order = [int(n) for n in np.argsort(distances, kind="stable") if n != without][: 1 + BESIDE]
@@ -191,9 +192,12 @@ class ScatteredViews:
 
         def view(number: int) -> tuple[object, tuple[float, float]]:
             nearness = self._nearness_of(number)
-            return seen_as(self.pictures[number], nearness), (float(away[number, 0]), float(away[number, 1]))
+            return engine.seen_as(self.pictures[number], nearness), (
+                float(away[number, 0]),
+                float(away[number, 1]),
+            )
 
-        looking = Looking(self._parallax, cores(), *view(first), 0, rows)  # type: ignore[arg-type]
+        looking = engine.Looking(self._parallax, cores(), *view(first), 0, rows)  # type: ignore[arg-type]
         found = looking.found
         if self._covered:
             found.seen[(found.seen > 0) & (found.out[..., -1] < 0.99)] = -1
