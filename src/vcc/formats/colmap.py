@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -145,10 +146,20 @@ def _lines(path: Path, empty_too: bool = False) -> Iterator[str]:
             yield line
 
 
+@contextmanager
+def _in_line(path: Path, line: str) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, OverflowError):
+        raise InputError(f'{path}: the line "{line[:60]}" is not as COLMAP writes it') from None
+
+
 def _cameras_in_text(path: Path) -> Iterator[tuple[int, LensModel]]:
     for line in _lines(path):
-        number, model, width, height, *numbers = line.split()
-        yield int(number), LensModel.of(model, int(width), int(height), [float(each) for each in numbers])
+        with _in_line(path, line):
+            number, model, width, height, *numbers = line.split()
+            made = int(number), LensModel.of(model, int(width), int(height), [float(each) for each in numbers])
+        yield made
 
 
 def _images_in_text(path: Path) -> Iterator[_Image]:
@@ -156,15 +167,19 @@ def _images_in_text(path: Path) -> Iterator[_Image]:
     for line in lines:
         if not line.strip():
             continue
-        _, *numbers, camera, name = line.split(maxsplit=9)
+        with _in_line(path, line):
+            _, *numbers, camera, name = line.split(maxsplit=9)
+            pose = np.array([float(each) for each in numbers])
+            made = pose[:4], pose[4:], int(camera), name.strip()
         next(lines, "")  # the points that it shows; empty if there are none
-        pose = np.array([float(each) for each in numbers])
-        if not np.isfinite(pose).all():
-            raise InputError(f"{path}: the pose of {name} is not finite")
-        yield pose[:4], pose[4:], int(camera), name.strip()
+        if len(pose) != 7 or not np.isfinite(pose).all():
+            raise InputError(f"{path}: the pose of {name} is not seven finite numbers")
+        yield made
 
 
 def _points_in_text(path: Path) -> Iterator[tuple[float, float, float]]:
     for line in _lines(path):
-        _, x, y, z, *_ = line.split(maxsplit=4)
-        yield float(x), float(y), float(z)
+        with _in_line(path, line):
+            _, x, y, z, *_ = line.split(maxsplit=4)
+            made = float(x), float(y), float(z)
+        yield made

@@ -71,6 +71,11 @@ def _lens(given: dict[str, Any], file: Path, where: str) -> LensModel:
             raise InputError(f"{where}: {name} is {value!r}, not a number")
         return float(value)
 
+    def tangent(name: str) -> float:
+        if not 0 < number(name) < math.pi:
+            raise InputError(f"{where}: {name} is {number(name):g}, not an angle between 0 and π radians")
+        return math.tan(number(name) / 2)
+
     if "w" in given and "h" in given:
         width, height = int(number("w")), int(number("h"))
     else:
@@ -79,8 +84,8 @@ def _lens(given: dict[str, Any], file: Path, where: str) -> LensModel:
         fx = number("fl_x")
         fy = number("fl_y", fx)
     elif "camera_angle_x" in given:
-        fx = width / 2 / math.tan(number("camera_angle_x") / 2)
-        fy = height / 2 / math.tan(number("camera_angle_y") / 2) if "camera_angle_y" in given else fx
+        fx = width / 2 / tangent("camera_angle_x")
+        fy = height / 2 / tangent("camera_angle_y") if "camera_angle_y" in given else fx
     else:
         raise InputError(f"{where} states neither fl_x nor camera_angle_x: its focal length is unknown")
     model = given.get("camera_model", "OPENCV")

@@ -229,8 +229,8 @@ class UnstructuredViews(Brief):
         """A light field on a planar grid of views, rendered from the photographs by depth.
 
         Disparities are found by plane sweeps of up to three photographs; each view takes its pixels from the
-        nearest photographs that show them (docs/depth.md). ``given`` is True for views that are within 0.1 pixels of
-        a photograph (resampled onto the grid's pixels); ``filling`` has the estimated errors of the others,
+        nearest photographs that show them (docs/depth.md). ``given`` is True for views within 0.1 pixels of a
+        photograph (resampled onto the grid's pixels); ``filling`` has the estimated errors of the others,
         and the share of pixels that no photograph shows, which is 0 beyond the photographs' borders.
 
         Args:

@@ -197,7 +197,7 @@ class ScatteredViews:
                 float(away[number, 1]),
             )
 
-        looking = engine.Looking(self._parallax, cores(), *view(first), 0, rows)  # type: ignore[arg-type]
+        looking = engine.Looking(self._parallax, cores(), *view(first), 0, rows)
         found = looking.found
         if self._covered:
             found.seen[(found.seen > 0) & (found.out[..., -1] < 0.99)] = -1
