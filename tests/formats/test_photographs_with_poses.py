@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import re
 import struct
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -72,6 +74,44 @@ def test_lenses_project_as_colmap_does(model: str) -> None:
     parameters, pixels = PROJECTED[model]
     found = LensModel.of(model, 640, 480, parameters).pixels(*DIRECTIONS.T)
     assert np.abs(np.stack(found, 1) - pixels).max() < 1e-6  # the numbers above have 6 decimals
+
+
+# Two photographs by a camera with the number 3, as pycolmap 4.2.1 writes them; binary, packed.
+WRITTEN = {
+    "cameras": "eNpjZIAAZiBmAWIHKN+AARl4QoQboDSDA5S2cJg1EwR27q8WWef+sKrF/s/Kj5d8kwKgdMJ+AM4xFZA=",
+    "images": (
+        "eNpjYoAARiBe89XcJ7Tnrf3MjDtct5x3QelT9kV+qh2PN13eD1H5wB5Cf4DyGRyYgUSigoFeQV46AxMDMvgBVcviwI"
+        "gizuEAoQUc/kMBQt8Hewa8AC7vADMLYr8h2H5GHPbD7AEAYo4umg=="
+    ),
+    "points3D": "eNpjZoAARgZUMGsmCJy0h/A4HBiZmCHMD/sZ0bQwoWjZaY+qVQBZK8x0ZjRbULWIYNMCAH+pHSI=",
+}
+
+
+def test_files_of_colmap_itself(tmp_path: Path) -> None:
+    for name, packed in WRITTEN.items():
+        (tmp_path / f"{name}.bin").write_bytes(zlib.decompress(base64.b64decode(packed)))
+    (tmp_path / "images").mkdir()
+    for n in range(2):
+        (tmp_path / "images" / f"a {n}.png").write_bytes(imagecodecs.png_encode(np.zeros((48, 64), np.uint8)))
+    found = open_unstructured(tmp_path).photographs
+    first, second = found.photographs
+    assert first.lens == second.lens
+    assert first.lens.model == "OPENCV"
+    assert list(first.lens.parameters.values()) == [50, 51, 32, 24, -0.1, 0.01, 0.001, -0.002]
+    assert [one.file.name for one in found.photographs] == ["a 0.png", "a 1.png"]
+    # cam_from_world and projection_center of pycolmap.
+    rotation = [
+        [0.7263157894736842, 0.6105263157894737, 0.31578947368421056],
+        [-0.5263157894736842, 0.7894736842105263, -0.3157894736842105],
+        [-0.4421052631578947, 0.06315789473684214, 0.8947368421052632],
+    ]
+    assert np.abs(first.rotation - rotation).max() < 1e-15
+    assert np.abs(first.centre - [-0.0052631578947367474, 0.3578947368421052, -2.263157894736842]).max() < 1e-15
+    assert np.array_equal(second.centre, [-1, -2, -3])
+    assert found.points is not None
+    assert np.array_equal(
+        found.points[np.argsort(found.points[:, 0])], [[0, 0.2, 3], [0.1, 0.2, 4], [0.2, 0.2, 5]]
+    )
 
 
 def test_lenses_end_where_their_radius_shrinks() -> None:
