@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 
 import vcc
 from vcc.base.errors import InputError, ResultWarning
+from vcc.cli.convert import convert
+from vcc.cli.info import describe
+from vcc.cli.options import Reading
 from vcc.files import transfer
 from vcc.formats import SparseViews, open_light_field, save_light_field
 from vcc.store import open_store, save_store
@@ -174,6 +177,19 @@ def test_every_reader_is_told_which_views_were_filled(tmp_path: Path) -> None:
     complete = vcc.LightField(views, filled.frame)
     assert complete.given.all()
     assert complete.filling is None
+
+
+def test_the_command_line_fills_and_reports(tmp_path: Path) -> None:
+    views, _ = board_before_wall()
+    folder = written(tmp_path / "star", pattern("star"), views)
+    store = tmp_path / "star.zarr"
+    reading = Reading(missing="fill", spacing=2e-3, slope_per_pixel=1e-3, focus_distance=math.inf)
+    with pytest.warns(ResultWarning, match="rendered from the others by depth"):
+        convert(folder, store, reading=reading)
+    assert np.array_equal(open_store(store).given, pattern("star"))
+    assert "8 of the 25 views" in describe(store)
+    assert "17 of 25 views recorded" in repr(open_store(store).read())
+    assert "--missing fill" in describe(folder)
 
 
 def test_integers_stay_integers() -> None:

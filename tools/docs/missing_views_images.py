@@ -39,14 +39,18 @@ def main(folder: Path = HERE) -> None:
     rows, columns = np.nonzero(star)
     axes[0].plot(columns, rows, "o", color=style.INK, markersize=5)
     axes[0].add_patch(_frame(*PLACE))
-    axes[0].set_title("33 given views (dots),\nestimated error of the others", fontsize=style.SMALL, color=style.INK)
+    axes[0].set_title(
+        "33 given views (dots),\nestimated error of the others", fontsize=style.SMALL, color=style.INK
+    )
     axes[0].set(xticks=[], yticks=[])
     bar = figure.colorbar(drawn, ax=axes[0], shrink=0.85, aspect=25)
     bar.ax.tick_params(labelsize=style.SMALL)
     made, true = filled.values[PLACE][PART] * white, desk.values[PLACE][PART] * white
     panels.framed(axes[1], encode(np.clip(made, 0, 1), 8), "the marked view, filled")
     panels.framed(axes[2], encode(np.clip(true, 0, 1), 8), "the same view, rendered")
-    difference = np.clip(8 * np.abs(encode(np.clip(made, 0, 1), 8) / 255.0 - encode(np.clip(true, 0, 1), 8) / 255.0), 0, 1)
+    difference = np.clip(
+        8 * np.abs(encode(np.clip(made, 0, 1), 8) / 255.0 - encode(np.clip(true, 0, 1), 8) / 255.0), 0, 1
+    )
     panels.framed(axes[3], difference, "difference, 8 times")
     figure.savefig(folder / "star.png")
 

@@ -271,8 +271,12 @@ class Grid(Value):
 
     @property
     def bands(self) -> str:
-        """The wavelengths as text, behind other words: ``", bands 465, 540, 610 nm"``; empty where unknown."""
-        return "" if self.wavelengths is None else f", {as_text(self.wavelengths)}"
+        """The wavelengths as text, behind other words: ``", bands 465, 540, 610 nm"``; empty where unknown.
+
+        Then the number of recorded views, if not all were.
+        """
+        recorded = "" if self.given.all() else f", {self.given.sum()} of {self.given.size} views recorded"
+        return recorded if self.wavelengths is None else f", {as_text(self.wavelengths)}{recorded}"
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))
