@@ -327,7 +327,7 @@ def test_a_photograph_at_a_place_of_the_grid_is_given(tmp_path: Path) -> None:
     assert "distances=" in said["scene"]
     with pytest.raises(InputError, match=r"distances=\(nearest, farthest\)"):
         views.on_grid()
-    with pytest.warns(ResultWarning, match="no photograph shows"):
+    with pytest.warns(ResultWarning, match=r"no photograph shows.*unit of the poses is taken as 1 m"):
         made = views.on_grid(distances=(1.4, 3))
     assert made.given.all()
     assert made.filling is not None

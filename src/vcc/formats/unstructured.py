@@ -114,11 +114,11 @@ class UnstructuredViews(Brief):
 
     Args:
         photographs: with their cameras.
-        metres_per_unit: of the poses.
+        metres_per_unit: of the poses; None takes the unit for a metre, and warns.
     """
 
     photographs: Photographs
-    metres_per_unit: float
+    metres_per_unit: float | None = None
 
     def __len__(self) -> int:
         return len(self.photographs.photographs)
@@ -128,7 +128,8 @@ class UnstructuredViews(Brief):
     def plane(self) -> CameraPlane:
         """The plane nearest to the cameras, and how far they are from it."""
         listed = self.photographs.photographs
-        centres = np.array([one.centre for one in listed]) * self.metres_per_unit
+        unit = self.metres_per_unit or 1.0
+        centres = np.array([one.centre for one in listed]) * unit
         ahead = np.array([one.rotation[2] for one in listed])
         forward, right = (np.mean([one.rotation[axis] for one in listed], axis=0) for axis in (2, 0))
         if min(np.linalg.norm(forward), np.linalg.norm(right)) < math.cos(_ALIKE):
@@ -152,7 +153,7 @@ class UnstructuredViews(Brief):
         points, distances = self.photographs.points, None
         origin = middle + centre @ axes
         if points is not None and len(points):
-            depths = (points * self.metres_per_unit - origin) @ normal
+            depths = (points * unit - origin) @ normal
             depths = depths[np.isfinite(depths) & (depths > 0)]
             if depths.size:
                 near, far = np.percentile(depths, _OUTERMOST)
@@ -181,8 +182,7 @@ class UnstructuredViews(Brief):
             "format": f"photographs with poses, {self.photographs.format}",
             "photographs": str(len(listed)),
             "lenses": "; ".join(f"{model}, {width} × {height} pixels" for model, width, height in sorted(lenses)),
-            "unit": f"{short(self.metres_per_unit)} for 1 of the file"
-            + (" (assumed: pass metres_per_unit)" if self.metres_per_unit == 1 else ""),
+            "unit": f"{short(self.metres_per_unit)}" if self.metres_per_unit else "not stated: taken as 1 m",
         }
         try:
             plane = self.plane
@@ -316,7 +316,8 @@ class UnstructuredViews(Brief):
         said = marked.filling.words.replace("the others by depth", "photographs by depth")
         share = f"{unseen.mean():.2%} of all pixels no photograph shows"
         off = f"cameras off the plane add up to {rms:.2g} pixels at the borders" if rms > 0.01 else ""
-        warnings.warn(f"{path}: {'; '.join(filter(None, (said, share, off)))}", ResultWarning, stacklevel=2)
+        unit = "" if self.metres_per_unit else "the unit of the poses is taken as 1 m: pass metres_per_unit=…"
+        warnings.warn(f"{path}: {'; '.join(filter(None, (said, share, off, unit)))}", ResultWarning, stacklevel=2)
         return LightField.of(values, marked)
 
     def _distances(self, given: tuple[float, float] | None) -> tuple[float, float]:
@@ -361,7 +362,7 @@ def open_unstructured(
     path: str | PathLike[str],
     *,
     images: str | PathLike[str] | None = None,
-    metres_per_unit: float = 1.0,
+    metres_per_unit: float | None = None,
     files_outside: bool = False,
 ) -> UnstructuredViews:
     """Open photographs with poses; ``open_unstructured(path).on_grid()`` makes a light field of them.
@@ -372,8 +373,8 @@ def open_unstructured(
         path: a project of COLMAP (a folder with ``sparse/0`` and ``images``), its model (a folder with ``cameras``
             and ``images``, ``.bin`` or ``.txt``), or a ``transforms.json`` or its folder.
         images: folder of the pictures; None uses ``images`` of the project, or the folder of ``transforms.json``.
-        metres_per_unit: length of one unit of the poses in metres: COLMAP cannot know it. 1 by default; distances
-            and spacings of the light field are right only up to this factor.
+        metres_per_unit: length of one unit of the poses in metres, which COLMAP cannot know. None takes 1, with a
+            warning of `UnstructuredViews.on_grid`: lengths of the light field are then right up to a factor.
         files_outside: allow names of pictures that leave their folder. Only for files that you trust.
 
     Raises:
@@ -381,7 +382,8 @@ def open_unstructured(
             factor that is not above 0.
     """
     path = expanded(path)
-    metres_per_unit = checks.above_zero("metres_per_unit", metres_per_unit)
+    if metres_per_unit is not None:
+        metres_per_unit = checks.above_zero("metres_per_unit", metres_per_unit)
     folder = None if images is None else expanded(images)
     with reading(path, "photographs with poses"):
         kind = recognised(path)

@@ -207,7 +207,7 @@ class ScatteredViews:
         picture = found.out
         if self._covered:
             share = picture[..., -1:]
-            shown &= share[..., 0] > 0.5
+            shown &= share[..., 0] > 0.1
             picture = np.where(share > 0.01, picture[..., :-1] / np.maximum(share, 0.01), 0)
         return np.maximum(picture, 0), shown
 
