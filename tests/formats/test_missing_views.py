@@ -238,13 +238,13 @@ def test_the_star_of_a_published_scene_against_its_left_out_views() -> None:
     np.fill_diagonal(there[::-1], True)
     with pytest.warns(ResultWarning):
         whole = open_light_field(DATA / "hci_antinous")
-    part = np.ascontiguousarray(whole.values[:, :, 160:320, 160:320])
+    part = np.ascontiguousarray(whole.values[:, :, 192:320, 192:320])
     filled = SparseViews(
-        part[there], tuple(map(tuple, np.argwhere(there).tolist())), (9, 9), whole[:, :, 160:320, 160:320].frame
+        part[there], tuple(map(tuple, np.argwhere(there).tolist())), (9, 9), whole[:, :, 192:320, 192:320].frame
     ).light_field()
     made, true = (transfer.encode(np.clip(each[~there], 0, 1), 8) / 255.0 for each in (filled.values, part))
     errors = ((made - true) ** 2).mean(axis=(1, 2, 3))
-    assert -10 * np.log10(errors.max()) > 36  # measured: 44 dB for the worst of the 48
+    assert -10 * np.log10(errors.max()) > 36  # of whole views: 42.3 dB for the worst of the 48
     assert filled.filling is not None
     linear = np.sqrt(((filled.values - part)[~there] ** 2).mean())
     expected = np.sqrt((filled.filling.error[~there] ** 2).mean())
