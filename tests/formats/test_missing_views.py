@@ -158,6 +158,7 @@ def test_folders_with_holes(tmp_path: Path) -> None:
 def test_every_reader_is_told_which_views_were_filled(tmp_path: Path) -> None:
     views, _ = board_before_wall()
     filled = sparse(pattern("cross"), views).light_field()
+    assert filled.filling is not None
     piece = filled[1:4, ::2]
     assert np.array_equal(piece.given, filled.given[1:4, ::2])
     assert np.array_equal(filled.transformed(vcc.Affine.lens(1.0)).given, filled.given)
@@ -167,6 +168,9 @@ def test_every_reader_is_told_which_views_were_filled(tmp_path: Path) -> None:
     assert np.array_equal(stored[1:4, ::2].given, piece.given)
     save_light_field(filled, tmp_path / "field.npz")
     assert open_light_field(tmp_path / "field.npz").filling == filled.filling
+    flipped = open_light_field(tmp_path / "field.npz", orientation="flip-rows")
+    assert np.array_equal(flipped.given, filled.given[::-1])
+    assert np.array_equal(filled.filling.moved(["transpose"]).error, filled.filling.error.T)
     with pytest.warns(ResultWarning, match=r"does not keep which views were recorded \(16 of 25"):
         save_light_field(filled, tmp_path / "folder")
     camera = vcc.Camera(
@@ -205,6 +209,9 @@ def test_one_view_cannot_fill_a_grid() -> None:
     views, _ = board_before_wall(1, 2)
     with pytest.raises(InputError, match="one view has no parallax"):
         sparse(np.array([[True, False]]), views).light_field()
+    far = SparseViews(views[0], ((0, 0), (0, 200)), (1, 201), sparse(np.ones((1, 2), bool), views).frame)
+    with pytest.raises(InputError, match="too few for a grid of 1×201"):
+        far.light_field("dark")
 
 
 def test_cameras_wider_than_a_row_of_views_report_the_missing_light() -> None:

@@ -79,6 +79,13 @@ class Filling(Value, Brief):
         part = as_slice(ranges[0]), as_slice(ranges[1])
         return Filling(self.given[part], self.error[part], self.unseen[part])
 
+    def moved(self, steps: Sequence[str]) -> Filling:
+        """After views were rearranged by "flip-rows", "flip-columns" and "transpose"."""
+        parts: list[NDArray[Any]] = [self.given, self.error, self.unseen]
+        for step in steps:
+            parts = [part.T if step == "transpose" else np.flip(part, int(step != "flip-rows")) for part in parts]
+        return Filling(*parts)
+
     @property
     def words(self) -> str:
         """Which views were filled, and how well, as a sentence; empty if all were recorded."""
@@ -92,7 +99,7 @@ class Filling(Value, Brief):
         said = f"not recorded, but rendered from the others by depth, are {named}"
         known = self.error[made][np.isfinite(self.error[made])]
         rms = math.sqrt(float(np.mean(known**2))) if known.size else math.nan
-        error = f"{rms:.2g} of full scale" if known.size else "unknown: too few views to test"
+        error = f"{rms:.2g} in radiance" if known.size else "unknown: too few views to test"
         worst = f", at most {known.max():.2g}" if known.size else ""
         share = f"{self.unseen[made].mean():.2%} of their pixels no view shows"
         return f"{said}. Estimated error (root mean square): {error}{worst}; {share}"

@@ -405,7 +405,7 @@ def _put_in_order(
     assert frame is not None  # a frame is stated if there are no cameras
     with checks.within(str(path)):
         stated = opened.geometry.wavelengths
-        filling = opened.geometry.filling if not moved.steps else None
+        filling = None if opened.geometry.filling is None else opened.geometry.filling.moved(moved.steps)
         grid = Grid(
             values.shape,
             frame,

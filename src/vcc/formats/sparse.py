@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, get_args
 
@@ -113,13 +114,18 @@ class SparseViews(Brief):
             progress: called with (done, total).
 
         Raises:
-            InputError: views are missing and are to be refused; a single view, or views without texture, to be
-                filled; more memory needed than allowed.
+            InputError: views are missing and are to be refused; fewer than one view in 64 exists; a single view, or
+                views without texture, to be filled; more memory needed than allowed.
         """
         checks.one_of("missing", missing, get_args(Missing))
         absent, given = self.missing, self.present
         if absent and missing == "refuse":
             raise InputError(f"views are missing: {first_few(absent, len(absent))}")
+        if math.prod(self.shape) > _MOST_PLACES * len(self.places):
+            raise InputError(
+                f"{len(self.places)} views are too few for a grid of {self.shape[0]}×{self.shape[1]}: more "
+                f"than one in {_MOST_PLACES} is needed. Is a row or column number wrong?"
+            )
         values = np.zeros(self._grid.shape, self.pictures.dtype)
         for place, picture in zip(self.places, self.pictures, strict=True):
             values[place] = picture
@@ -179,6 +185,7 @@ class SparseViews(Brief):
         return None
 
 
+_MOST_PLACES = 64  # places of a grid for one view that exists
 _CROSS = ((-1, 0), (0, -1), (0, 0), (0, 1), (1, 0))
 
 
