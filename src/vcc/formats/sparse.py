@@ -114,8 +114,8 @@ class SparseViews(Brief):
             progress: called with (done, total).
 
         Raises:
-            InputError: views are missing and are to be refused; fewer than one view in 64 exists; a single view, or
-                views without texture, to be filled; more memory needed than allowed.
+            InputError: views are missing and are to be refused; fewer than one view in 64; a single view, or
+                views without texture, to be filled; not enough memory.
         """
         checks.one_of("missing", missing, get_args(Missing))
         absent, given = self.missing, self.present
