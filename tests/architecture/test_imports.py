@@ -80,6 +80,7 @@ BY_NAME = {
     "sources.depth_map": "meshes are made by compiled loops",
     "sources.splats.scene": "splats are drawn by compiled loops",
     "engines": "an engine is loaded when it is first used: Numba takes a second",
+    "run.scattered_views": "compiled loops of views in between",
     "run.drive": "views in between need Numba",
     "run.operator": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "cli": "a command is loaded when it is called",

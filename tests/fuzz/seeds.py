@@ -108,6 +108,40 @@ def cambridge(folder: Path) -> None:
     np.save(folder / "disparity.npy", np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32))
 
 
+def colmap(ending: str) -> Maker:
+    """A row of five photographs before a wall of points."""
+
+    def make(folder: Path) -> None:
+        (folder / "images").mkdir()
+        grid(folder / "images", "v{n}", ".png", size=(1, 5))
+        if ending == ".txt":
+            (folder / "cameras.txt").write_text("# cameras\n1 OPENCV 32 24 40 40 16 12 -0.1 0.01 0 0\n")
+            lines = [f"{n + 1} 1 0 0 0 {-0.1 * n} 0 0 1 v{n}.png\n1.5 2.5 -1\n" for n in range(5)]
+            (folder / "images.txt").write_text("".join(lines))
+            (folder / "points3D.txt").write_text("1 0 0 2 9 9 9 0.5 1 1\n2 0.1 0 3 9 9 9 0.5 1 1\n")
+            return
+        lens = struct.pack("<QIiQQ8d", 1, 1, 4, 32, 24, 40, 40, 16, 12, -0.1, 0.01, 0, 0)
+        (folder / "cameras.bin").write_bytes(lens)
+        data = struct.pack("<Q", 5)
+        for n in range(5):
+            data += struct.pack("<I7dI", n + 1, 1, 0, 0, 0, -0.1 * n, 0, 0, 1) + f"v{n}.png\0".encode()
+            data += struct.pack("<QddQ", 1, 1.5, 2.5, 2**64 - 1)
+        (folder / "images.bin").write_bytes(data)
+        data = struct.pack("<Q", 2)
+        for n in range(2):
+            data += struct.pack("<Q3d3BdQII", n, 0.1 * n, 0, 2 + n, 9, 9, 9, 0.5, 1, 1, 1)
+        (folder / "points3D.bin").write_bytes(data)
+
+    return make
+
+
+def transforms(folder: Path) -> None:
+    grid(folder, "v{n}", ".png", size=(1, 5))
+    matrices = [[[1, 0, 0, 0.1 * n], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] for n in range(5)]
+    frames = [{"file_path": f"v{n}", "transform_matrix": matrix} for n, matrix in enumerate(matrices)]
+    (folder / "transforms.json").write_text(json.dumps({"camera_angle_x": 0.7, "k1": -0.1, "frames": frames}))
+
+
 def views_csv(folder: Path) -> None:
     grid(folder, "v{n}", ".png")
     lines = ["row,col,file"] + [f"{n // 3},{n % 3},v{n}.png" for n in range(9)]

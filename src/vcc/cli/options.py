@@ -285,10 +285,13 @@ class Reading(Arrangement, ViewCameras):
             linear, whatever the files state. A store contains linear light.
         orientation: Direction of rows and columns of views. auto checks it by parallax and corrects it; as-is
             uses the files as they are.
+        missing: Views that are missing in a folder's grid: fill renders them from the others by depth and reports
+            the estimated error; dark leaves them without light.
     """
 
     transfer: Literal["auto", "srgb", "linear", "as-is"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
+    missing: Literal["refuse", "fill", "dark"] = "refuse"
 
     def light(self, path: Path) -> LightField | StoredLightField | StoredVideo:
         """As `light_field`, but a video is supported, too."""
