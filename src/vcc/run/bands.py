@@ -144,13 +144,13 @@ class Mixing(Brief):
         """The gradient to ``shares[n]`` of the image of the sensor, weighted.
 
         Args:
-            image: of train n.
-            weights: of the image of the sensor.
+            image: of train n, (rows, columns[, channels]).
+            weights: of the image of the sensor, likewise.
             n: the train.
         """
         image = image[..., None] if self.without_channels[0] else image
         weights = weights[..., None] if self.without_channels[1] else weights
-        return np.asarray(np.einsum("...k,...p->kp", weights, image, dtype=np.float64))
+        return np.asarray(np.tensordot(weights.astype(np.float64), image.astype(np.float64), ((0, 1), (0, 1))))
 
     def _channel(self, image: Any, p: int) -> Any:
         return image if self.without_channels[0] else image[..., p]
