@@ -47,6 +47,7 @@ class FolderInfo(Brief):
         notices: notices of the format's reader, each a sentence.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` unless the files state otherwise.
         metadata: metadata of the pictures of a folder.
+        wavelengths: of the channels, metres; None if not stated.
     """
 
     format: str
@@ -69,6 +70,7 @@ class FolderInfo(Brief):
     notices: tuple[str, ...] = ()
     sample: Sample = "mean"
     metadata: ViewsWithMetadata = field(default_factory=lambda: ViewsWithMetadata({}, None))
+    wavelengths: tuple[float, ...] | None = None
 
     @property
     def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
@@ -150,6 +152,7 @@ def _info(
         unknown=tuple(name for name, known in stated.items() if not known),
         files=(),
         directions=geometry.directions,
+        wavelengths=geometry.wavelengths,
         sample=geometry.sample,
     )
 
