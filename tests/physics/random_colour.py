@@ -105,6 +105,9 @@ class Coloured:
             listed = [one for row in made.photodiodes for one in row]
             images = [(one.to_numpy().astype(np.float64), one.sampling_error) for one in listed]
         peak = max(truth.max() for truth, _ in truths)
+        if peak == 0:  # masks that never see the same light
+            dark = not any(found.any() for found, _ in images)
+            return np.inf if dark else 0.0, 0.0 if dark else np.inf, f"{self.case.kind} {self.case.seed}: dark"
         worst = (np.inf, 0.0, "")
         for (truth, doubt), (found, stated) in zip(truths, images, strict=True):
             difference = found.reshape(truth.shape) - truth

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, is_array_api_obj
+from array_api_compat import array_namespace
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
@@ -77,7 +77,7 @@ class SomeChannels(Brief):
             return None
         if isinstance(values, np.ndarray):
             return _copied(values, self.channels)
-        if not is_array_api_obj(values):
+        if type(values).__module__.startswith("numba"):  # on the GPU, by `on_gpu`
             return on_gpu(np.ascontiguousarray(to_numpy(values)[..., list(self.channels)]))
         return array_namespace(values).stack([values[..., n] for n in self.channels], axis=-1)
 
