@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.reading import expanded, reading, shown
 from vcc.base.units import short
+from vcc.base.wavelengths import as_text
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
 from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, given_options
@@ -213,6 +214,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "format": facts.format,
         "views": f"{facts.rows} × {facts.columns} (rows × columns)",
         "pictures": f"{facts.width} × {facts.height} pixels, {colour}, {kind}",
+        **({} if facts.wavelengths is None else {"bands": as_text(facts.wavelengths).partition(" ")[2]}),
         "samples": SAMPLES_IN_WORDS[facts.sample],
         "size": f"{samples * facts.bits // 8 / 1e6:,.1f} MB in memory as stored, "
         f"{samples * 4 / 1e6:,.1f} MB as linear light",

@@ -49,6 +49,7 @@ class FolderInfo(Brief):
         metadata: metadata of the pictures of a folder.
         off_grid: root mean square distance of stated camera positions from an even grid, in its steps along rows
             and columns of views; None if the format states no positions.
+        wavelengths: of the channels, metres; None if not stated.
     """
 
     format: str
@@ -72,6 +73,7 @@ class FolderInfo(Brief):
     sample: Sample = "mean"
     metadata: ViewsWithMetadata = field(default_factory=lambda: ViewsWithMetadata({}, None))
     off_grid: tuple[float, float] | None = None
+    wavelengths: tuple[float, ...] | None = None
 
     @property
     def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
@@ -154,6 +156,7 @@ def _info(
         files=(),
         directions=geometry.directions,
         off_grid=geometry.off_grid,
+        wavelengths=geometry.wavelengths,
         sample=geometry.sample,
     )
 

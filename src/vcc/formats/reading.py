@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -70,6 +70,11 @@ def read_geometry(
     """
     path = expanded(path)
     with reading(path, "a light field"):
+        if bands := bands_in(path):
+            of_each = {"views": views, "order": order, "sparse": sparse, "files_outside": files_outside, **options}
+            first = read_geometry(next(iter(bands)), **of_each)
+            kind = f"a folder for each band: {first.format}"
+            return replace(first, format=kind, channels=len(bands), wavelengths=tuple(bands.values()))
         if containers.container_of(path) is not None:
             return info_of_file(_decoded(path, views, order, None, _with(options, files_outside)))
         grid = find_grid(path, views, order, sparse=sparse, files_outside=files_outside, options=options)
