@@ -8,17 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.explain import explained
 from vcc.analysis.point_spread import PointSpread, mtf, psf
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.bench.document import shown
-from vcc.bench.picture import jpeg
+from vcc.bench.screen import jpeg
 from vcc.camera import Camera
 from vcc.light_field import LightField
 from vcc.optics.train import Train
-from vcc.plan.choice import compile_best
-from vcc.plan.how import How
 from vcc.plot.fans import focused_distance
 from vcc.plot.phase_space import phase_space_at, phase_space_stages
 from vcc.plot.phase_space_rays import PhaseSpacePicture
@@ -59,8 +56,7 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
         InputError: unknown question, or this camera has no answer to it.
     """
     if what == "explain":
-        plan = compile_best(train, light_field.grid)
-        return {"words": str(explained(train, light_field, plan, How()))}, []
+        return {"words": str(Camera(train.elements, train.sensor).explain(light_field))}, []
     if what == "point spread":
         return _point_spread(_psf(message, train))
     if what == "mtf":
