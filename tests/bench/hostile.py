@@ -171,7 +171,7 @@ ASKED = [
     "gallery",
     "name",
 ]
-ASKED += ["from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
+ASKED += ["number", "look", "ends", "from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
 PATHS: list[Json] = [
     ["elements", 1, "pattern"],
     ["sensor", "z"],

@@ -80,7 +80,7 @@ def test_what_is_too_slow_costs_a_tenth_of_the_time_at_most():
     made = machine.drag(30)
     spent = made.count(WHOLE) * (0.040 - IN_TIME)
     assert 0 < spent <= TRIALS * 30
-    assert LEFT <= 30 / made.count(WHOLE)
+    assert 30 / made.count(WHOLE) >= LEFT
 
 
 def test_delay_of_a_first_image_by_compilation_is_forgotten_when_a_finer_one_is_quicker():

@@ -26,8 +26,8 @@ from vcc.bench import offered as offered_there
 from vcc.bench import picture as picture_there
 from vcc.bench import session as session_there
 from vcc.bench.document import Document
-from vcc.bench.offered import Field
 from vcc.bench.inbox import CHANGES, MOST_WAITING, QUESTIONS, Broken
+from vcc.bench.offered import Field
 from vcc.bench.picture import COARSER, WHOLE, take
 from vcc.bench.screen import codes
 from vcc.camera_file import ELEMENT_KINDS

@@ -29,7 +29,7 @@ def test_rays_land_where_similar_triangles_put_them():
     by_role = {rays["role"]: rays for rays in found["rays"]}
     assert list(by_role) == ["off axis", "near", "focused"]  # the one in focus is drawn on top
     assert by_role["focused"]["distance"] == pytest.approx(focus)
-    # by Newton the image of a point at Z is 1/(1/f − 1/Z) behind the lens; the near one's is too far behind the sensor
+    # by Newton the image of a point at Z is 1/(1/f − 1/Z) behind the lens; the near one's is far behind the sensor
     assert {role: rays["meet"] and rays["meet"][0] for role, rays in by_role.items()} == {
         "off axis": pytest.approx(0.052, rel=1e-4),
         "near": None,

@@ -34,7 +34,7 @@ export interface BenchDocument {
   noise: boolean;
 }
 
-/** A parameter of an element, the sensor or a pattern. `family` names the list that a value is chosen from. */
+/** A parameter of an element, the sensor or a pattern; `family` names the list from which it is chosen. */
 export interface Parameter {
   name: string;
   words: string;

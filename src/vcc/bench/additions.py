@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import itertools
 import math
@@ -42,16 +43,19 @@ DEEPEST = 3
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
+@functools.cache
 def kinds() -> list[Json]:
     """All kinds of elements, with their parameters."""
     return [_kind(name, kind) for name, kind in ELEMENT_KINDS.items()]
 
 
+@functools.cache
 def sensor_parameters() -> list[Json]:
     """The parameters of a sensor."""
     return _parameters(Sensor, DEEPEST)
 
 
+@functools.cache
 def families() -> Json:
     """Patterns, kernels and surfaces by name, with their parameters."""
     found: dict[str, Family] = {}
@@ -181,8 +185,11 @@ BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")
 
 
 def _suitable_place(kind: str, train: Train) -> float:
-    """Where an element of a kind makes sense: lenslets a focal length before the sensor, what stands close to the
-    sensor before it, other lenses in the widest gap, and everything else at the first lens, or at the first rim."""
+    """Where an element of a kind makes sense, metres.
+
+    Lenslets stand a focal length before the sensor, louvres and angle filters close to it, other lenses in the widest
+    gap, and everything else at the first lens or the first rim.
+    """
     z = train.sensor.z
     if kind in BEFORE_SENSOR:
         before = units.parse(_lenslets(train)["focal_length"], "length", "z") if kind == "lens_array" else z / 25
@@ -305,8 +312,8 @@ def made_whole(
 def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], str | None]:
     """The cells of an uploaded image or array, transmissions, and a remark if they were reduced.
 
-    Larger arrays are reduced to at most `MOST_BROUGHT` cells, by means over blocks of equal size; images of several
-    channels become their mean. Images are linear: the readers of camera files decode their transfer function.
+    Larger arrays are reduced to at most `MOST_BROUGHT` cells, by means over equal areas; several channels become
+    their mean. Images are linear: the readers of camera files decode their transfer function.
 
     Args:
         name: of the file; its ending selects the format.

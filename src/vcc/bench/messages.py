@@ -57,7 +57,7 @@ Takes = Literal["number", "whole number", "text", "truth", "list", "array", "nam
 
 
 class Parameter(TypedDict):
-    """A parameter of an element, the sensor or a pattern. ``family`` names the list that a value is chosen from."""
+    """A parameter of an element, the sensor or a pattern; ``family`` names the list from which it is chosen."""
 
     name: str
     words: str

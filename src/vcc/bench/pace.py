@@ -49,8 +49,8 @@ class Pace:
     The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest. For a
     fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
     scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
-    busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that were
-    measured meanwhile are forgotten.
+    busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
+    were measured meanwhile are forgotten.
 
     Args:
         clock: seconds.

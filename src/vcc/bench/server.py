@@ -59,7 +59,7 @@ TOO_MANY, BROKEN, FORBIDDEN = 1013, 1008, 4403
 
 @dataclass(frozen=True)
 class Door:
-    """Access control of a bench: every client needs the token, since other users may have accounts on this machine.
+    """Access control of a bench: every client needs the token, since this machine may have other users.
 
     Args:
         host: the address that the server listens on.

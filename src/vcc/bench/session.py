@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
 
@@ -26,7 +26,7 @@ from vcc.bench.editing import Editing
 from vcc.bench.focusing import distance_at
 from vcc.bench.imaging import Imaging, Wanted
 from vcc.bench.inbox import CHANGES, Broken, Inbox, turn_of
-from vcc.bench.messages import BenchDocument, PictureMessage, StateMessage
+from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
 from vcc.bench.picture import WHOLE, Taken
 from vcc.bench.pins import Pins
@@ -81,6 +81,7 @@ class Session:
         self._resting: tuple[Wanted, float] | None = None
         self._look = screen.PLAIN
         self._white = 1.0
+        self._drawn: tuple[Document, Hashable, Side] | None = None
         self._thread: threading.Thread | None = None
 
     @property
@@ -302,14 +303,8 @@ class Session:
             self._tell("refused", told)
 
     def _tell_state(self, turn: int, moving: bool = False) -> None:
-        document, history, train = self.document, self._editing.history, self._editing.train
-        field = self.offered.field(document.light_field)
-        grid, seen, aperture = self._editing.grid, None, None
-        if field.is_open:
-            whole = field.whole()
-            views = whole if document.views is None else whole[document.views.slices]
-            seen = views.transformed(document.aperture.rays)
-            aperture = drawn_aperture(document.aperture, views, train, self._look.axis)
+        document, history = self.document, self._editing.history
+        grid = self._editing.grid
         told: StateMessage = {
             "turn": turn,
             "document": None if moving else cast(BenchDocument, document.as_json()),
@@ -317,9 +312,25 @@ class Session:
             "redo": history.can_redo,
             "grid": None if grid is None else list(grid.shape),
             "bands": None if grid is None or grid.wavelengths is None else list(grid.wavelengths),
-            "side": side(self._editing.described, seen, grid, aperture, self._look.axis),
+            "side": self._side(moving),
         }
         self._tell("state", told)
+
+    def _side(self, moving: bool) -> Side:
+        """The side view of the document; drawn again if it has changed."""
+        document, train, axis = self.document, self._editing.train, self._look.axis
+        field = self.offered.field(document.light_field)
+        of = field.is_open, axis, moving
+        if self._drawn is None or self._drawn[0] is not document or self._drawn[1] != of:
+            seen, aperture = None, None
+            if field.is_open:
+                whole = field.whole()
+                views = whole if document.views is None else whole[document.views.slices]
+                seen = views.transformed(document.aperture.rays)
+                aperture = drawn_aperture(document.aperture, views, train, axis)
+            found = side(self._editing.described, seen, self._editing.grid, aperture, axis, moving)
+            self._drawn = document, of, found
+        return self._drawn[2]
 
     def _opening(self, done: int, total: int) -> None:
         self._tell("progress", {"done": done, "total": total, "words": "Opening the light field"})

@@ -76,6 +76,7 @@ def side(
     grid: Grid | None,
     aperture: SideAperture | None = None,
     axis: int = AXIS,
+    moving: bool = False,
 ) -> Side:
     """The side view of a camera.
 
@@ -85,6 +86,7 @@ def side(
         grid: its scene gives the distances to show; None for no scene.
         aperture: of the light field, from `vcc.bench.aperture.drawn_aperture`.
         axis: 0 if x points upwards in the drawing, 1 for y.
+        moving: during a drag there are no snaps: those from before it count.
     """
     elements, train = described.elements, described.train
     points = _points(train, grid, axis)
@@ -102,7 +104,7 @@ def side(
     focus = focused_distance(train)
     scene = {} if grid is None else {f"{name} of the scene": z for name, z in scene_distances(grid).items()}
     places = without_repeats(scene | ({} if focus is None else {"what is sharp now": focus}))
-    pulled = snaps_of_elements(elements, train, places)
+    pulled = [[] for _ in elements] if moving else snaps_of_elements(elements, train, places)
     fans = [_rays(point, path, axis) for point, path in zip(points, paths, strict=True)]
     meeting = [fan["meet"][0] for fan in fans if fan["meet"] is not None]
     return {
@@ -123,7 +125,7 @@ def side(
         },
         "rays": sorted(fans, key=lambda fan: _ORDER.index(fan["role"])),
         "aperture": aperture,
-        "snaps": snaps_of_sensor(train, scene),
+        "snaps": [] if moving else snaps_of_sensor(train, scene),
         "words": _words(train, focus, grid, axis),
     }
 
