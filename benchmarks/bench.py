@@ -6,8 +6,8 @@
     python benchmarks/bench.py --jupyterlab    # the widget in JupyterLab (pip install jupyterlab anywidget)
 
 ``vcc bench`` runs in a process of its own, as users start it, and headless Chromium drags parts with its mouse, to
-60 places a second, with snapping. Times are taken in the page: from when the browser had the input until the first task after the
-frame in which the canvas was drawn with a picture of that place or a later one. Nothing is warmed up but the
+60 places a second, with snapping. Times are taken in the page: from when the browser had the input until the
+first task after the frame in which the canvas was drawn with a picture of that place or a later one. Nothing is warmed up but the
 picture that the page shows when it opens.
 """
 
@@ -293,8 +293,8 @@ def drag(page: Any, case: Case) -> dict[str, Any]:
 def told(case: Case, seen: dict[str, Any]) -> str:
     """A line of the table: what was seen, with what is aimed at.
 
-    Snapping is on: while the part is held where something is sharp, nothing changes and no picture is made. That time
-    does not count for the rate.
+    Snapping is on: while the part is held where something is sharp, nothing changes and no picture is made. That
+    time does not count for the rate.
     """
     inputs, drawn = np.array(seen["inputs"]), sorted(seen["drawn"])
     turns, times = np.array([one[1] for one in drawn]), np.array([one[0] for one in drawn])

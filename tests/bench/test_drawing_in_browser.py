@@ -1,4 +1,4 @@
-"""The drawing of the bench in headless Chromium: looked at closely and changed by its handles; mouse, touch, keys."""
+"""The drawing of the bench in headless Chromium: looked at closely, changed by its handles; mouse, touch, keys."""
 
 import pytest
 

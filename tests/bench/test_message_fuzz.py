@@ -1,4 +1,4 @@
-"""Five thousand messages that no front end sends: each is done or refused in words, and the state stays consistent."""
+"""Five thousand messages that no front end sends: each is done or refused in words; the state stays consistent."""
 
 import json
 import random

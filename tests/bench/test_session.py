@@ -490,6 +490,112 @@ def test_a_plan_is_given_up_where_its_picture_is_no_longer_wanted(monkeypatch):
         take(START.train(NOWHERE).train, Field(noise()), START, WHOLE, progress)
 
 
+# --- photodiodes and bands ---
+
+
+def test_photodiodes_are_shown_side_by_side_as_capture_makes_them(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("look", look={"photodiodes": "apart"})
+    client.do("set", where=["sensor", "photodiodes"], value=[1, 2], turn=2)
+    while True:
+        message, (data,) = client.until("picture", "no picture")
+        if message["turn"] == 2 and not message["coarse"]:
+            break
+    assert (message["shape"], message["photodiodes"]) == ((PIXELS, 2 * PIXELS), (1, 2))
+    assert imagecodecs.jpeg_decode(data).shape[:2] == (PIXELS, 2 * PIXELS)
+    image = camera_of(client.session.document).capture(noise())
+    (row,) = image.upright().photodiodes
+    for column, photodiode in enumerate(row):  # in their order as people see the image
+        client.do("value", x=column * PIXELS + 7, y=9)
+        told = client.until("value")[0]["irradiance"]
+        assert told == pytest.approx(photodiode.values[9, 7].tolist(), rel=1e-5)
+    client.do("look", look={})
+    assert client.until("picture")[0]["shape"] == (PIXELS, PIXELS)
+    client.do("value", x=7, y=9)
+    told = client.until("value")[0]["irradiance"]
+    assert told == pytest.approx(image.upright().values[9, 7].tolist(), rel=1e-5)
+
+
+def test_glass_gets_wavelengths_by_itself_and_each_band_its_own_picture(client):
+    client.do("hello")
+    client.at_rest()
+    glass = {"kind": "lens", "glass": "N-BK7", "focal_length": "50 mm", "diameter": "18 mm", "z": "0 mm"}
+    client.do("set", where=["elements", 0], value=glass, turn=2)
+    state, _ = client.until("state", "refused")
+    assert state["document"]["wavelengths"] == ["610 nm", "540 nm", "465 nm"]
+    assert state["bands"] == pytest.approx([610e-9, 540e-9, 465e-9])
+    message = client.at_rest()
+    assert (message["is"], message["turn"]) == ("picture", 2), message
+    field = noise().with_wavelengths([610e-9, 540e-9, 465e-9])
+    expected = camera_of(client.session.document).capture(field).upright().to_numpy()[4, 3]
+    client.do("value", x=3, y=4)
+    assert client.until("value")[0]["irradiance"] == pytest.approx(expected.tolist(), rel=1e-6)
+    client.do("ask", what="explain")
+    assert "610 nm" in client.until("answer")[0]["words"]
+    client.do("set", where=["wavelengths"], value=["610 nm"], turn=3)
+    assert "wavelengths" in client.until("refused")[0]["words"]
+
+
+@pytest.mark.parametrize("name", ["glass", "photodiodes"])
+def test_program_of_bands_and_photodiodes_makes_the_identical_picture(name, tmp_path, monkeypatch):
+    changes = {
+        "glass": {"where": ["elements", 0, "glass"], "value": "N-BK7"},
+        "photodiodes": {"where": ["sensor", "photodiodes"], "value": [1, 2]},
+    }
+    client = Client()
+    client.do("hello")
+    client.at_rest()
+    client.do("set", **changes[name])
+    client.at_rest()
+    stated, program = exported(client, "python")
+    _, picture = exported(client, "png")
+    client.close()
+    assert stated == "picture.py"
+    (tmp_path / "picture.py").write_bytes(program)
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        runpy.run_path("picture.py")
+    assert (tmp_path / "picture.png").read_bytes() == picture
+
+
+def test_a_profile_is_that_of_the_image_and_as_long_as_on_the_sensor(client):
+    client.do("hello")
+    client.at_rest()
+    values = camera_of(START).capture(noise()).upright().to_numpy()
+    client.do("ask", what="profile", ends=[3, 5, 13, 5])
+    told, _ = client.until("answer")
+    assert pytest.approx(values[5, 3:14], rel=1e-5) == np.array(told["values"]).T
+    assert told["places"] == pytest.approx(np.arange(11) * 1e-3)  # pixels of 1 mm
+    client.do("ask", what="profile", ends=[2, 2, 6, 6])
+    diagonal, _ = client.until("answer")
+    assert diagonal["places"][-1] == pytest.approx(4e-3 * 2**0.5)
+    client.do("ask", what="profile", ends=[2, 2, 2, 2])
+    assert "one pixel" in client.until("refused")[0]["words"]
+
+
+def test_a_look_shows_a_channel_with_other_levels_and_leaves_the_numbers(client):
+    client.do("hello")
+    message = client.at_rest()
+    histogram = message["histogram"]
+    values = camera_of(START).capture(noise()).to_numpy()
+    assert [sum(counts) for counts in histogram["counts"]] == [PIXELS**2] * 3
+    assert histogram["above"] == pytest.approx(np.mean(values > message["white"]))
+    client.until("notes")
+    client.do("look", look={"black": 0.25, "linear": True, "channel": 1}, turn=4)
+    message, (data,) = client.until("picture")
+    shown = imagecodecs.jpeg_decode(data).astype(float)
+    black, white = 0.25 * message["white"], message["white"]
+    exact = 255 * np.clip((values[::-1, ::-1, 1] - black) / (white - black), 0, 1)
+    assert shown.ndim == 2
+    assert np.abs(shown - exact).max() < 8  # JPEG at its best quality
+    assert message["histogram"]["below"] == pytest.approx(np.mean(values <= black), abs=1e-6)
+    for look in ({"black": 1}, {"channel": -1}, {"linear": 1}, {"photodiodes": "all"}, {"axis": "z"}, 5, {"x": 1}):
+        client.do("look", look=look)
+        assert len(client.until("refused")[0]["words"]) > 20
+
+
 # --- sequences ---
 
 ACTIONS = some.one_of(

@@ -51,7 +51,7 @@ def test_levels_show_what_is_clipped_and_change_black_white_and_channel(page):
     page.button("Levels").click()
     levels = page.page.locator("vcc-bench-levels")
     assert levels.locator(".bars").count() == 3
-    assert "above white" in levels.text_content()
+    assert "above white" in levels.locator(".clipped").text_content()
     panel = canvas(page)
     levels.get_by_label("black").first.press("Shift+ArrowRight")
     darker = changed(page, panel)
@@ -79,7 +79,7 @@ def test_pointer_reads_values_and_the_place_on_the_sensor(page):
     page.page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + box["height"] / 2 + 2)
     page.page.get_by_text("column 40, row 30").wait_for()
     # The pixel right of the middle and below it, as seen; the sensor's image is inverted: half a pitch of 0.25 mm.
-    page.page.get_by_text("x -125 µm, y -125 µm").wait_for()
+    page.page.get_by_text("x -0.125 mm, y -0.125 mm").wait_for()
 
 
 def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):
@@ -110,7 +110,7 @@ def test_picture_is_downloaded_as_it_is_shown(page):
         page.button("Download as shown").click()
     saved = np.asarray(PIL.Image.open(taken.value.path()).convert("RGB")).astype(int)
     shown = canvas(page)
-    assert saved.shape == shown.shape
+    assert np.abs(np.array(saved.shape) - shown.shape).max() <= 1  # half a pixel of the page
     assert np.abs(saved[100:200, 300:400] - shown[100:200, 300:400]).max() <= 2
 
 
@@ -168,10 +168,6 @@ def test_frames_of_a_sweep_are_gone_through_by_hand(page):
 
 def test_photodiodes_stand_side_by_side(page):
     page.page.get_by_role("tab", name="sensor").click()
-    page.page.locator("#sensor-microlens").check()
-    page.settle()
-    page.page.locator("#sensor-microlens-height").fill("0.4 mm")
-    page.page.keyboard.press("Enter")
     page.page.locator("#sensor-photodiodes").fill("1, 2")
     page.page.keyboard.press("Enter")
     page.page.wait_for_function("document.querySelector('vcc-bench').bench.picture.about.photodiodes[1] === 2")

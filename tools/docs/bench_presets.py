@@ -11,9 +11,9 @@ import PIL.Image
 
 from vcc.bench.cameras import SCENE, cameras, scenes
 from vcc.bench.picture import take
-from vcc.bench.starting import PRESETS
 from vcc.bench.published import Gallery
 from vcc.bench.screen import codes, white_of
+from vcc.bench.starting import PRESETS
 from vcc.files.camera_reading import Beside
 
 FOLDER = Path(__file__).parents[2] / "src" / "vcc" / "bench" / "presets"
@@ -24,7 +24,7 @@ def main() -> None:
     """Make all of them."""
     fields, gallery = scenes(), Gallery(cameras(SCENE), SCENE)
     FOLDER.mkdir(exist_ok=True)
-    for title, (name, _) in PRESETS.items():
+    for title, (name, *_) in PRESETS.items():
         document = gallery[title]
         train = document.train(Beside(Path(), frozenset())).train
         values = take(train, fields[document.light_field], document).values

@@ -247,7 +247,7 @@ export class Bench extends EventTarget {
     const wasSilent = this.silent;
     this.open = state === "open";
     this.silent = state === "silent";
-    if (!this.open) this.absent = this.document || this.silent ? this.host.lost : this.host.awaited;
+    if (!this.open) this.absent = this.host.why ?? (this.document || this.silent ? this.host.lost : this.host.awaited);
     if (this.silent || wasSilent) {
       // Nothing was lost: what was sent is still to be answered.
       this.changed();

@@ -10,6 +10,8 @@ export interface Host {
   /** What is said while it is not open, the first time and later. */
   readonly awaited: string;
   readonly lost: string;
+  /** Why the other side closed the connection, if it said so. */
+  readonly why: string | null;
   /** Begins; handlers are set before. */
   start(): void;
   /** Ends for good. */
@@ -58,14 +60,13 @@ const LONGEST_WAIT = 10_000;
 /** What is read of a message that is not sent. */
 type Sent = { do: string; turn?: number; where?: Where | null; name?: string };
 
-const GONE = "The server is gone. What you see stays; the bench goes on when the server is back.";
-
 /** Connects to the server, and again whenever it was lost, a little later each time. */
 export class SocketHost implements Host {
   onmessage: Host["onmessage"] = () => {};
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for the server …";
-  lost = GONE;
+  readonly lost = "The server is gone. What you see stays; the bench goes on when the server is back.";
+  why: string | null = null;
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
   private timer = 0;
@@ -95,7 +96,7 @@ export class SocketHost implements Host {
       this.socket = null;
       if (this.ended) return;
       const why = CLOSED[code];
-      this.lost = why?.words ?? GONE;
+      this.why = why?.words ?? null;
       this.onstate("closed");
       if (why && !why.again) return;
       this.timer = window.setTimeout(() => this.start(), this.wait);
@@ -147,6 +148,7 @@ export class WidgetHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for Python …";
   readonly lost = "Python does not answer: it runs a cell, and then the bench goes on; or it was restarted, and then the cell of the bench is to be run again.";
+  readonly why = null;
   private timer = 0;
   private silent = false;
   private readonly hears = (message: FromHost | Heard, buffers?: DataView[]) => {

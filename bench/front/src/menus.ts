@@ -34,8 +34,8 @@ export class MenusView extends Part {
     const { bench } = this;
     const { presets, gallery } = bench.parts!;
     return this.menu("Open", html`
-      ${presets.length ? html`<div class="presets">${presets.map(({ title, words }, number) => html`<button data-item class="preset" @click=${() => bench.act({ do: "load", gallery: title })}>
-        <img src=${bench.thumbnails[number] ?? ""} alt=""><span>${title}</span><span class="quiet">${words}</span></button>`)}</div><hr>` : nothing}
+      ${presets.length ? html`<div class="presets">${presets.map(({ title, label, words }, number) => html`<button data-item class="preset" @click=${() => bench.act({ do: "load", gallery: title })}>
+        <img src=${bench.thumbnails[number] ?? ""} alt=""><span>${label}</span><span class="quiet">${words}</span></button>`)}</div><hr>` : nothing}
       <button data-item @click=${(event: Event) => ((event.currentTarget as Element).nextElementSibling as HTMLInputElement).click()}>Camera file …</button>
       <input type="file" hidden accept=".toml" aria-label="Camera file" @change=${(event: Event) => void this.load(event.target as HTMLInputElement)}>
       ${gallery.length ? html`<hr>` : nothing}
@@ -129,7 +129,7 @@ export class MenusView extends Part {
       .menu { position: relative; }
       .items { position: absolute; right: 0; top: 32px; min-width: 210px; max-height: min(620px, 84cqh); overflow-y: auto; padding: 5px; background: var(--well); border: 1px solid var(--line); border-radius: 8px; box-shadow: 0 6px 24px rgb(0 0 0 / 14%); display: grid; }
       .items button { justify-content: start; }
-      .presets { display: grid; grid-template-columns: repeat(3, 150px); gap: 4px; }
+      .presets { display: grid; grid-template-columns: repeat(3, minmax(140px, 1fr)); gap: 4px; }
       .preset { display: grid; justify-items: start; align-content: start; height: auto; padding: 6px; gap: 3px; white-space: normal; text-align: start; line-height: 1.25; font-size: 12px; }
       .preset img { width: 100%; aspect-ratio: 1; object-fit: cover; border-radius: 5px; background: var(--stage); }
       .preset span:first-of-type { font-weight: 600; }

@@ -483,6 +483,7 @@ export class PictureView extends Part {
       .group { display: flex; align-items: center; gap: 2px; }
       .group + label.check { margin-left: 6px; }
       .spring { flex: 1; }
+      .bar select { flex: none; width: auto; }
       .stage { position: relative; flex: 1; min-height: 0; background: var(--stage); overflow: hidden; }
       canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: crosshair; }
       canvas[data-aiming] { cursor: cell; }
@@ -504,7 +505,8 @@ export class PictureView extends Part {
       .line { display: flex; gap: 14px; min-height: 26px; align-items: center; padding: 0 10px; font-size: 12px; color: var(--quiet); white-space: nowrap; overflow: hidden; }
       .line > span { overflow: hidden; text-overflow: ellipsis; white-space: pre; }
       .line > .missing { color: var(--warn-ink); }
-      @container (max-width: 540px) { .short { display: inline; } .long { display: none; } .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
+      @container (max-width: 740px) { .short { display: inline; } .long { display: none; } }
+      @container (max-width: 540px) { .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
     `,
   ];
 }

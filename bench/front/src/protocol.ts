@@ -57,6 +57,7 @@ export interface Kind {
 /** A camera to begin with; its thumbnail is the buffer of the same number. */
 export interface Preset {
   title: string;
+  label: string;
   words: string;
 }
 

@@ -25,6 +25,8 @@ const KEY_PAUSE = 500;
 /** Of the magnifier, pixels; what is closer than this to the sensor or to where rays meet is shown in it. */
 const LENS = { width: 156, height: 88 };
 const CLOSE = 26;
+/** In a narrower drawing it would cover the rays. */
+const NARROW = 460;
 
 interface Drag {
   which: Selected;
@@ -367,7 +369,7 @@ export class SideView extends Part {
 
   /** What stands close to the sensor, and where rays meet, enlarged; nothing where the drawing shows it already. */
   private drawMagnifier(side: Side, scale: Mapping) {
-    if (this.frame.zoom > 1 || this.width < 300 || this.drag?.which === "light field") return nothing;
+    if (this.frame.zoom > 1 || this.width < NARROW || this.drag?.which === "light field") return nothing;
     const sensor = this.bench.placeOf("sensor");
     const near = this.parts().map((which) => this.bench.placeOf(which) + this.lengthOf(which));
     const every = [...near, ...side.rays.flatMap((each) => (each.meet ? [each.meet[0]] : []))].filter((z) => Math.abs(scale.x(z) - scale.x(sensor)) < CLOSE);

@@ -187,8 +187,8 @@ BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")
 def _suitable_place(kind: str, train: Train) -> float:
     """Where an element of a kind makes sense, metres.
 
-    Lenslets stand a focal length before the sensor, louvres and angle filters close to it, other lenses in the widest
-    gap, and everything else at the first lens or the first rim.
+    Lenslets stand a focal length before the sensor, louvres and angle filters close to it, other lenses in the
+    widest gap, and everything else at the first lens or the first rim.
     """
     z = train.sensor.z
     if kind in BEFORE_SENSOR:

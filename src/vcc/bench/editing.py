@@ -102,6 +102,9 @@ class Editing:
         if where == ["noise"] and value is True and self.train.sensor.electronics is None:
             changed = changed.changed(["sensor", "electronics"], {})
             remark = "The sensor has got electronics, with the default numbers: see its fields."
+        if where == ["sensor", "microlens"] and value == {} and self.train.sensor.photodiodes == (1, 1):
+            changed = changed.changed(["sensor", "photodiodes"], [1, 2])
+            remark = "A microlens needs several photodiodes: the pixels have got two, side by side."
         if where == ["sensor", "electronics"] and value is None and changed.noise:
             changed = changed.changed(["noise"], False)
             remark = "Noise requires electronics, and is switched off."

@@ -10,6 +10,8 @@ from vcc.optics import Element
 from vcc.optics.sensor import Sensor
 from vcc.plot.elements import half_size
 
+FAR = 1.0
+"""Metres from the axis, beyond any drawing: handles stand at its border."""
 QUARTER = math.pi / 2
 """Rotation, radians, for a drag over half the height of an element."""
 
@@ -32,7 +34,7 @@ def handles_of(element: Element, axis: int) -> list[Handle]:
         found.append(_handle(["focal_length"], "focal length", focal_length, focal_length, centre, 1.0, along="z"))
     rotation = getattr(element, "rotation", None)
     if isinstance(rotation, float) and _is_own(element, "rotation"):
-        low = -half if math.isfinite(half) else 0.0
+        low = -half if math.isfinite(half) else -FAR
         rate = QUARTER / half if math.isfinite(half) and half > 0 else QUARTER / 0.01
         found.append(_handle(["rotation"], "rotation", rotation, 0.0, centre + low, rate, unit="angle"))
     return found

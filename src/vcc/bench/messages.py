@@ -82,6 +82,7 @@ class Preset(TypedDict):
     """A camera to begin with; its thumbnail is the buffer of the same number."""
 
     title: str
+    label: str
     words: str
 
 

@@ -141,7 +141,7 @@ class Offered:
         start: the first document.
         beside: the files that cameras may name.
         gallery: example cameras by their titles.
-        presets: those to begin with: a sentence and a thumbnail, JPEG or WebP, by title.
+        presets: those to begin with: a short title, a sentence and a thumbnail, JPEG or WebP, by title.
         turn: the lock to hold while making an image.
     """
 
@@ -149,7 +149,7 @@ class Offered:
     start: Document
     beside: Beside
     gallery: Mapping[str, Document] = field(default_factory=dict)
-    presets: Mapping[str, tuple[str, bytes]] = field(default_factory=dict)
+    presets: Mapping[str, tuple[str, str, bytes]] = field(default_factory=dict)
     turn: Turn = field(default_factory=Turn, compare=False)
 
     def field(self, name: str) -> Field:

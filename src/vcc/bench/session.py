@@ -235,9 +235,12 @@ class Session:
                 "sensor": additions.sensor_parameters(),
                 "families": additions.families(),
                 "gallery": [title for title in self.offered.gallery if title not in presets],
-                "presets": [{"title": title, "words": words} for title, (words, _) in presets.items()],
+                "presets": [
+                    {"title": title, "label": label, "words": words}
+                    for title, (label, words, _) in presets.items()
+                ],
             },
-            [thumbnail for _, thumbnail in presets.values()],
+            [thumbnail for *_, thumbnail in presets.values()],
         )
         if message.get("document") is not None:
             try:

@@ -12,9 +12,9 @@ from vcc.base.progress import Progress
 from vcc.bench.cameras import SCENE, cameras, scenes
 from vcc.bench.document import Document
 from vcc.bench.offered import Field, Offered
-from vcc.bench.starting import presets
 from vcc.bench.published import Gallery, title_of
 from vcc.bench.server import LOOPBACK, run
+from vcc.bench.starting import presets
 from vcc.camera_file import load_camera
 from vcc.cli.console import show
 from vcc.cli.options import Reading, Whole
