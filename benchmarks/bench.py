@@ -7,8 +7,8 @@
 
 ``vcc bench`` runs in a process of its own, as users start it, and headless Chromium drags parts with its mouse, to
 60 places a second, with snapping. Times are taken in the page: from when the browser had the input until the
-first task after the frame in which the canvas was drawn with a picture of that place or a later one. Nothing is warmed up but the
-picture that the page shows when it opens.
+first task after the frame in which the canvas was drawn with a picture of that place or a later one. Nothing is
+warmed up but the picture that the page shows when it opens.
 """
 
 from __future__ import annotations

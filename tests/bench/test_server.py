@@ -1,5 +1,6 @@
 """The bench in a browser: who may come in, what is served, what ends whom. Real sockets on this machine."""
 
+import random
 import re
 import signal
 import socket
@@ -11,7 +12,7 @@ import time
 import urllib.error
 import urllib.request
 from asyncio import base_events
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 
 import pytest
 from hypothesis import given
@@ -184,6 +185,49 @@ def test_ten_clients_each_with_a_bench_of_its_own(bench):
             assert told(socket, "picture")[0]["turn"] == turn
     with let_in(bench):  # those who went make room
         pass
+
+
+def test_nine_clients_work_on_while_the_tenth_is_hostile():
+    chance, over = random.Random(4), threading.Event()
+    address = f"/bench?token={DOOR.token}"
+    junk = [
+        *BROKEN.values(),
+        packed({"do": "load", "document": {"camera": {"sensor": {"shape": [10**6, 10**6]}}, "light_field": "x"}}),
+        packed({"do": "upload", "where": ["elements", 1, "pattern"], "name": "a.png"}, [bytes(2**22)]),
+        packed({"do": "set", "where": ["sensor", "z"], "value": "1e300 m"}),
+        packed({"do": "add", "kind": "mask", "z": "5 mm " * 10_000}),
+        packed(
+            {"do": "ask", "what": "scrub", "frames": 200, "where": ["sensor", "z"], "from": "9 mm", "to": "1 m"}
+        ),
+    ]
+
+    def be_hostile(bench):
+        while not over.is_set():
+            with suppress(ConnectionClosed, OSError), connect(f"ws://{bench}{address}", max_size=None) as socket:
+                for _ in range(chance.randint(1, 40)):
+                    socket.send(chance.choice(junk))
+            with suppress(ConnectionClosed, OSError), connect(f"ws://{bench}/bench?token=guess") as socket:
+                socket.recv(timeout=5)
+
+    with served(DOOR) as bench, ExitStack() as there:
+        sockets = [there.enter_context(coming(bench)) for _ in range(MOST_CLIENTS - 1)]
+        for socket in sockets:
+            socket.send(packed({"do": "hello"}))
+        hostile = threading.Thread(target=be_hostile, args=(bench,), daemon=True)
+        hostile.start()
+        for turn in range(1, 4):
+            for number, socket in enumerate(sockets):
+                place = f"{50 + turn + number / 10:g} mm"
+                socket.send(packed({"do": "set", "where": ["sensor", "z"], "value": place, "turn": turn}))
+            for number, socket in enumerate(sockets):
+                while (message := told(socket, "state", "refused", "failed")[0]).get("turn") != turn:
+                    pass
+                assert message["is"] == "state"
+                assert message["document"]["camera"]["sensor"]["z"] == f"{50 + turn + number / 10:g} mm"
+                while told(socket, "picture")[0]["turn"] != turn:
+                    pass
+        over.set()
+        hostile.join(30)
 
 
 def coming(bench, key=""):
