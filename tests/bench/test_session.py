@@ -533,6 +533,8 @@ def test_glass_gets_wavelengths_by_itself_and_each_band_its_own_picture(client):
     assert client.until("value")[0]["irradiance"] == pytest.approx(expected.tolist(), rel=1e-6)
     client.do("ask", what="explain")
     assert "610 nm" in client.until("answer")[0]["words"]
+    client.do("ask", what="mtf")
+    assert "for the design wavelength" in client.until("answer")[0]["remark"]
     client.do("set", where=["wavelengths"], value=["610 nm"], turn=3)
     assert "wavelengths" in client.until("refused")[0]["words"]
 

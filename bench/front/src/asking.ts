@@ -40,6 +40,10 @@ export class AskingView extends Part {
     window.clearTimeout(this.askTimer);
   }
 
+  protected override watched() {
+    return this.beside === "parts" ? [this.bench.notes, foldsViews(this.bench.document), this.bench.document !== null] : null;
+  }
+
   showParts(): void {
     this.beside = "parts";
   }
@@ -154,6 +158,7 @@ export class AskingView extends Part {
           this.askAgain();
         }}></label>` : nothing}
       ${this.beside === OF_PLANES ? this.planeField() : nothing}
+      ${answer && "remark" in answer.message && answer.message.remark ? html`<p class="advice">${answer.message.remark}</p>` : nothing}
       ${answer ? drawnAnswer(answer) : html`<p class="quiet">…</p>`}</div>`;
   }
 

@@ -23,6 +23,11 @@ export class EditorView extends Part {
     field?.select();
   }
 
+  protected override watched() {
+    const { document, side, notes, refused, selected, parts, views, bands } = this.bench;
+    return [document, side, notes, refused, selected, parts, views, bands];
+  }
+
   /** The name of what is selected is in sight, however many there are. */
   protected override updated(): void {
     const chips = this.renderRoot.querySelector<HTMLElement>(".chips");

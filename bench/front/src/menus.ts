@@ -26,6 +26,10 @@ export class MenusView extends Part {
     this.film = null;
   }
 
+  protected override watched() {
+    return this.film === null ? [this.bench.parts] : null;
+  }
+
   override render() {
     return this.bench.parts ? [this.opening(), this.keeping()] : nothing;
   }

@@ -85,6 +85,11 @@ export class PictureView extends Part {
     this.watch.disconnect();
   }
 
+  protected override watched() {
+    const { picture, pins, pinned, value, without, look, frames, document, answers, waiting } = this.bench;
+    return [picture, picture?.about, pins, pinned, value, without, look, frames, document?.exposure, document?.noise, document?.camera.sensor["shape"], answers.get("profile"), waiting];
+  }
+
   private get canvas(): HTMLCanvasElement {
     return this.renderRoot.querySelector("canvas")!;
   }

@@ -7,6 +7,10 @@ import { Part, controls } from "./part";
 import { sign } from "./signs";
 
 export class PinsView extends Part {
+  protected override watched() {
+    return [this.bench.pins];
+  }
+
   override render() {
     const { bench } = this;
     return html`<ul aria-label="Pinned states">

@@ -378,6 +378,7 @@ export interface PointAnswer {
   distance: number | null;
   brightest: number;
   outside: number;
+  remark: string | null;
 }
 
 /** Contrast by frequency: [cycles per millimetre, contrast]. */
@@ -387,12 +388,14 @@ export interface MtfAnswer {
   down: [number, number][];
   pixels: number;
   distance: number | null;
+  remark: string | null;
 }
 
 /** Planes of phase space, their JPEGs as buffers; `frame` is the range of all planes if one was requested. */
 export interface PhaseSpaceAnswer {
   planes: Plane[];
   frame: Extent | null;
+  remark: string | null;
 }
 
 /** The image along a line: (x, y) of its ends in pixels. */

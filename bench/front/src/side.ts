@@ -80,6 +80,11 @@ export class SideView extends Part {
     this.removeEventListener("touchstart", this.twoFingers);
   }
 
+  protected override watched() {
+    const { side, document, open, selected, notes } = this.bench;
+    return [side, document, open, selected, notes];
+  }
+
   private parts(): (number | "sensor")[] {
     const all: (number | "sensor")[] = this.bench.side?.elements.map((_, number) => number) ?? [];
     return [...all, "sensor"];

@@ -30,6 +30,11 @@ export class BenchView extends Part {
     window.removeEventListener("keydown", this.keyOutside);
   }
 
+  protected override watched() {
+    const { canUndo, canRedo, open, absent, waiting, picture, refused, remark, progress, side, selected } = this.bench;
+    return [canUndo, canRedo, open, absent, waiting, picture === null, refused, remark, progress, side === null, selected];
+  }
+
   private get asking(): AskingView | null {
     return this.renderRoot.querySelector("vcc-bench-asking");
   }

@@ -58,12 +58,25 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
     if what == "explain":
         return {"words": str(Camera(train.elements, train.sensor).explain(light_field))}, []
     if what == "point spread":
-        return _point_spread(_psf(message, train))
-    if what == "mtf":
-        return _mtf(message, train), []
-    if what == "phase space":
-        return _phase_space(message, train, light_field)
-    raise InputError(f"unknown question {shown(what)}: use one of {', '.join(QUESTIONS)}")
+        told, pictures = _point_spread(_psf(message, train))
+    elif what == "mtf":
+        told, pictures = _mtf(message, train), []
+    elif what == "phase space":
+        told, pictures = _phase_space(message, train, light_field)
+    else:
+        raise InputError(f"unknown question {shown(what)}: use one of {', '.join(QUESTIONS)}")
+    return told | {"remark": _remark(train)}, pictures
+
+
+def _remark(train: Train) -> str | None:
+    """What an answer leaves out: it is for one camera, and the image is made of several."""
+    said = []
+    depending = [element.label for element in train.elements if element.depends_on_band]
+    if depending:
+        said.append(f"for the design wavelength: {', '.join(depending)} differ between the bands")
+    if train.sensor.has_parts:
+        said.append("for whole pixels: photodiodes and kinds of pixels differ")
+    return f"This is {'; and '.join(said)}." if said else None
 
 
 def _distance(message: Json, train: Train) -> float:

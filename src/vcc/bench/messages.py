@@ -464,6 +464,7 @@ class PointAnswer(TypedDict):
     distance: float | None
     brightest: float
     outside: float
+    remark: str | None
 
 
 class MtfAnswer(TypedDict):
@@ -474,6 +475,7 @@ class MtfAnswer(TypedDict):
     down: list[Pair]
     pixels: float
     distance: float | None
+    remark: str | None
 
 
 class PhaseSpaceAnswer(TypedDict):
@@ -481,6 +483,7 @@ class PhaseSpaceAnswer(TypedDict):
 
     planes: list[Plane]
     frame: Extent | None
+    remark: str | None
 
 
 class ProfileAnswer(Curve):
