@@ -22,7 +22,8 @@ HOST = """async () => {
     is: "state", turn, undo: false, redo: false, grid: [3, 3, 8, 8, 3], bands: null,
     document: {
       camera: {elements: [], sensor: {z: `${z} mm`, shape: [8, 8], pitch: "1 mm"}}, light_field: "scene",
-      views: null, aperture: {z: "0 mm", decentre: ["0 mm", "0 mm"]}, wavelengths: null, exposure: null, noise: false,
+      views: null, aperture: {z: "0 mm", decentre: ["0 mm", "0 mm"]}, wavelengths: null,
+      exposure: null, noise: false,
     },
     side: {
       axis: "x", start: -0.02, end: 0.06, half: 0.01, elements: [], rays: [], aperture: null, snaps: [], words: [],

@@ -261,6 +261,7 @@ def test_cameras_come_from_text_and_from_the_gallery():
     assert client.until("state")[0]["document"]["camera"]["sensor"]["z"] == "30 mm"  # what is so is said again
     client.do("load", toml='[sensor]\nz = 1979-05-27\nshape = [4, 4]\npitch = "1 mm"\n')
     assert client.until("refused", "state")[0]["is"] == "refused"
+    client.until("state")
     client.do("load", gallery="other")
     client.until("state")
     assert client.session.document.camera["sensor"]["z"] == "55 mm"
