@@ -151,7 +151,7 @@ def decoded(bench: Bench) -> None:
 
 def compared(bench: Bench) -> None:
     """A plate of wavefront coding against the lens alone, by a wipe."""
-    bench.page.get_by_role("button", name="Pin").click()
+    bench.page.get_by_role("button", name="Pin", exact=True).click()
     bench.page.get_by_text("now · the same").wait_for()
     bench.page.get_by_label("Add an element").select_option("phase_plate")
     bench.settle()
