@@ -43,7 +43,6 @@ class Straight:
                 self.session._make_picture()
             except Superseded:
                 self.session._wanted = None
-        self.session._resting = None
         return [message for message, _ in self.told]
 
 

@@ -428,10 +428,11 @@ def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_
     monkeypatch.setattr(imaging_there, "take", coarse_while_moving)
     client.do("set", where=["sensor", "z"], value="53 mm", moving=True, turn=1)
     coarse, _ = client.until("picture")
+    client.do("set", where=["sensor", "z"], value="53 mm", moving=True, rests=True, turn=2)
     whole, _ = client.until("picture")
-    assert [(each["turn"], each["coarse"]) for each in (coarse, whole)] == [(1, True), (1, False)]
-    client.do("set", where=["sensor", "z"], value="53 mm", turn=2)
-    assert client.at_rest()["turn"] == 2
+    assert [(each["turn"], each["coarse"]) for each in (coarse, whole)] == [(1, True), (2, False)]
+    client.do("set", where=["sensor", "z"], value="53 mm", turn=3)
+    assert client.at_rest()["turn"] == 3
     assert made[:2] == [COARSER[0], WHOLE]
     assert WHOLE not in made[2:]  # of what is the same again none is made
     client.close()

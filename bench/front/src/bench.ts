@@ -23,6 +23,8 @@ export interface Answered<What extends Answer["what"] = Answer["what"]> {
 
 /** After so long the newest value is sent although the state of the last one has not come, milliseconds. */
 const PATIENCE = 150;
+/** After so long without a new value a hand that drags holds still, milliseconds. */
+const REST = 40;
 const REMARK = 12_000;
 const ADDRESS_AFTER = 250;
 const LONGEST_ADDRESS = 200_000;
@@ -88,6 +90,7 @@ export class Bench extends EventTarget {
   private timer = 0;
   private addressTimer = 0;
   private remarkTimer = 0;
+  private restTimer = 0;
   private pictures = 0;
   private latestPicture = 0;
   private valueUnderway = false;
@@ -110,6 +113,7 @@ export class Bench extends EventTarget {
     window.clearTimeout(this.timer);
     window.clearTimeout(this.addressTimer);
     window.clearTimeout(this.remarkTimer);
+    window.clearTimeout(this.restTimer);
     this.host.close();
   }
 
@@ -118,9 +122,11 @@ export class Bench extends EventTarget {
   /** Change one value; while moving, only the newest is sent, when the host has taken the one before. */
   set(where: Where, value: Value, moving = false): void {
     if (this.document) this.document = patched(this.document, where, value);
+    window.clearTimeout(this.restTimer);
     if (moving) {
       this.next = { where, value };
       if (!this.underway) this.sendNext();
+      this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
     } else {
       this.next = null;
       this.settle();
@@ -129,7 +135,16 @@ export class Bench extends EventTarget {
     this.changed();
   }
 
+  /** A hand that holds still sees the whole picture. */
+  private rest(where: Where, value: Value): void {
+    this.next = null;
+    this.settle();
+    this.ask({ do: "set", where, value, moving: true, rests: true });
+    this.changed();
+  }
+
   act(message: { do: string } & { [name: string]: unknown }, buffers?: ArrayBuffer[]): void {
+    window.clearTimeout(this.restTimer);
     this.next = null;
     this.settle();
     this.ask(message, buffers);

@@ -85,6 +85,8 @@ class Inbox:
     def asks_about_next_image(self) -> bool:
         """Whether the first message asks about the image to be made, and that image is still needed."""
         waiting = [message for message, _ in self._waiting]
+        if not waiting:
+            return False
         changed = any(message["do"] in CHANGES for message in waiting)
         return not changed and waiting[0].get("what") in decoded.QUESTIONS
 

@@ -18,8 +18,8 @@ LEFT = 0.4
 """Seconds after which a fineness that was too slow is tried again, if it was fast enough once."""
 TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
-WORTH = 2.0
-"""A fineness is tried again if its shortest time is at most this times the limit."""
+WORTH = 1.1
+"""A fineness is tried again if its shortest time, by how busy the machine is, is at most this times the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
 MOST_KINDS = 50
@@ -108,8 +108,10 @@ class Pace:
 
     def _tried(self, of: Hashable, fineness: Fineness, limit: float) -> bool:
         """Whether a fineness that was too slow is worth another trial now."""
-        times = self._kept[of][1].get(fineness)
-        if times is None or times.least > WORTH * limit:
+        every = self._kept[of][1]
+        times = every.get(fineness)
+        newest = max(every.values(), key=lambda each: each.at)
+        if times is None or times.least * newest.recent / newest.least > WORTH * limit:
             return False
         return self._clock() - times.at >= max(LEFT, (times.recent - limit) / TRIALS)
 

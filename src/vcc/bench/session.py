@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, cast
@@ -45,8 +44,6 @@ LINGER = 2.0
 """Seconds that the thread waits for more work before it ends."""
 PAUSE = 0.1
 """Seconds of idleness after which images are rehearsed."""
-REST = 0.03
-"""Seconds without a move after which a hand rests, and the whole image of the place is made."""
 
 log = logging.getLogger("vcc.bench")
 
@@ -78,7 +75,6 @@ class Session:
         self._changed = threading.Condition()
         self._closed = False
         self._wanted: Wanted | None = None
-        self._resting: tuple[Wanted, float] | None = None
         self._look = screen.PLAIN
         self._white = 1.0
         self._drawn: tuple[Document, Hashable, Side] | None = None
@@ -145,8 +141,7 @@ class Session:
     def _work(self) -> None:
         while True:
             with self._changed:
-                rests = self._has_rested()
-                if not rests and self._is_idle() and not self._changed.wait_for(self._has_to_do, LINGER):
+                if self._is_idle() and not self._changed.wait_for(self._has_to_do, LINGER):
                     self._thread = None
                     return
                 if self._closed:
@@ -167,16 +162,6 @@ class Session:
                 self._wanted = None
                 self._tell("failed", {"words": f"a bug in the program: {type(error).__name__}: {error}"})
 
-    def _has_rested(self) -> bool:
-        """Wait while a hand may move on; if it rests, the whole image is wanted. Call with the lock held."""
-        if self._resting is None:
-            return False
-        wanted, since = self._resting
-        if self._changed.wait_for(self._has_to_do, max(since + REST - time.monotonic(), 0.0)):
-            return False
-        self._wanted, self._resting = wanted, None
-        return True
-
     def _is_idle(self) -> bool:
         """Wait a moment for work; return whether there is none, and nothing to rehearse."""
         return not self._changed.wait_for(self._has_to_do, PAUSE) and (
@@ -187,8 +172,18 @@ class Session:
         return self._closed or bool(self._inbox) or (self._wanted is not None and self._send is not None)
 
     def _next(self) -> tuple[Json | None, list[bytes]]:
-        """Take the next message; None if an image must be made first."""
-        if not self._inbox or (self._wanted and self._inbox.asks_about_next_image()):
+        """Take the next message; None if an image must be made first.
+
+        During a drag, the image of each value that was taken is made before the next value is taken: otherwise a
+        client that always has another one would see none.
+        """
+        wanted = self._wanted
+        first = (
+            wanted is not None
+            and self._send is not None
+            and ((wanted.moving and not self._inbox.supersedes(True)) or self._inbox.asks_about_next_image())
+        )
+        if not self._inbox or first:
             return None, []
         return self._inbox.take()
 
@@ -253,7 +248,10 @@ class Session:
         self._wanted = Wanted(turn_of(message), moving=False)
 
     def _do_set(self, message: Json) -> None:
-        self._changed_by(message, self._editing.set(message), bool(message.get("moving", False)))
+        moving, rests = bool(message.get("moving", False)), bool(message.get("rests", False))
+        self._changed_by(message, self._editing.set(message), moving)
+        if moving and rests:  # a hand that holds still sees the whole image, until it moves on
+            self._wanted = Wanted(turn_of(message), moving=False, coarse_shown=True)
 
     def _do_add(self, message: Json) -> None:
         self._editing.add(message)
@@ -300,7 +298,7 @@ class Session:
     def _changed_by(self, message: Json, remark: str | None = None, moving: bool = False) -> None:
         """Show the document, which a message has changed, and say what was done besides."""
         self._tell_state(turn_of(message), moving)
-        self._wanted, self._resting = Wanted(turn_of(message), moving), None
+        self._wanted = Wanted(turn_of(message), moving)
         if remark is not None:
             told = {"do": message["do"], "words": remark, "where": None, "turn": turn_of(message), "done": True}
             self._tell("refused", told)
@@ -356,10 +354,7 @@ class Session:
             self._tell("no picture", {"turn": wanted.turn, "words": str(_in_words(error))})
             return
         self._tell_picture(taken, wanted)
-        whole = replace(wanted, moving=False, coarse_shown=True)
-        self._wanted = whole if taken.coarse and not wanted.moving else None
-        if taken.coarse and wanted.moving:
-            self._resting = whole, time.monotonic()
+        self._wanted = replace(wanted, coarse_shown=True) if taken.coarse and not wanted.moving else None
         if not taken.coarse and not wanted.moving:
             self._tell("notes", {"turn": wanted.turn, "notes": self._imaging.notes(taken)})
 
