@@ -23,7 +23,7 @@ import vcc
 from tests.bench.on_bench import CAMERA, START, Client, offered
 from vcc.bench import additions
 from vcc.bench.document import Document
-from vcc.bench.session import CHANGES, QUESTIONS
+from vcc.bench.inbox import CHANGES, QUESTIONS
 
 Json = Any
 LONG = 5.0
@@ -171,7 +171,7 @@ ASKED = [
     "gallery",
     "name",
 ]
-ASKED += ["from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
+ASKED += ["number", "look", "ends", "from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
 PATHS: list[Json] = [
     ["elements", 1, "pattern"],
     ["sensor", "z"],
