@@ -50,7 +50,7 @@ def camera_of(name: str) -> vcc.Camera:
 
 
 def test_published_figures_of_zemax() -> None:
-    """OpticStudio 2025 R2.02, of a singlet with the stop on its second surface (Optiland, validation report 710)."""
+    """OpticStudio 2025 R2.02, of a singlet with a stop on its second surface: Optiland, validation report 710."""
     first = lens_of("singlet").first_order
     back = 92.7383463
     assert first.focal_length / mm == pytest.approx(101.501826, abs=1e-6)
