@@ -392,6 +392,8 @@ class RealLens(Element):
             words.append(f"stop {short(lens.stop_diameter)}")
             if math.isfinite(lens.f_number):
                 words.append(f"f/{lens.f_number:.3g}")
+        open_ones = sum(each.diameter is None and not each.stop for each in self.prescription.surfaces)
+        words += [f"{open_ones} surfaces without a clear diameter"] if open_ones else []
         words += ["a mask at its stop"] if self.mask is not None else []
         words += ["dispersion"] if self.depends_on_band else []
         words += [f"{self.radiometry} radiometry"]
