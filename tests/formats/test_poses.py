@@ -82,6 +82,9 @@ def test_colmap(tmp_path):
         assert camera.forward == pytest.approx((1, 0, 0))
         assert camera.up == pytest.approx((0, 1, 0))
         assert camera.field_of_view == pytest.approx(math.pi / 2)
+    (tmp_path / "images.bin").write_bytes(bytes(8))
+    with pytest.raises(InputError, match="has no cameras"):
+        read_poses(tmp_path / "images.bin")
     (tmp_path / "images.bin").write_bytes(image[:-9])
     with pytest.raises(InputError, match="truncated"):
         read_poses(tmp_path / "images.bin")

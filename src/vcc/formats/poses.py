@@ -60,7 +60,10 @@ def read_poses(path: str | PathLike[str]) -> list[PosedCamera]:
     if found.name in ("images.bin", "images.txt"):
         check_file(found, "file of cameras")
         with reading(found, "cameras with poses"):
-            return [_of_colmap(*pose) for pose in colmap.poses(found.parent)]
+            cameras = [_of_colmap(*pose) for pose in colmap.poses(found.parent)]
+            if not cameras:
+                raise InputError("it has no cameras")
+            return cameras
     if found.suffix.lower() != ".json":
         raise InputError(
             f"{found} is no file of cameras: transforms.json (NeRF, nerfstudio), cameras.json (3D Gaussian "
