@@ -75,7 +75,7 @@ def test_eye_and_target(folder):
         (("-o", "a.zarr", "--camera", 12), "--camera is 12, and there are the cameras 0 to 11"),
         (("-o", "a.zarr", "--eye", "0, 0, 1"), "give both"),
         (("-o", "a.zarr", "--aperture", "1 mm", "--parallax", 1), "give one of them"),
-        (("-o", "a.zarr", "--camera-from", "images.bin"), "transforms.json"),
+        (("-o", "a.zarr", "--camera-from", "poses.npy"), "transforms.json"),
         (("-o", "a.zarr", "--eye", "0, 0, 9", "--target", "0, 0, 99"), "are behind the array"),
         (("-o", "a.zarr", "--degree", 3), "degree of the harmonics"),
         (("--look", "--degree", 3), "degree of the harmonics"),

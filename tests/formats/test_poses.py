@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -61,6 +62,34 @@ def test_other_files_raise(tmp_path, text, message):
         read_poses(tmp_path / "a.json")
 
 
-def test_other_endings_name_a_way_out(tmp_path):
-    with pytest.raises(InputError, match=r"ns-process-data or colmap2nerf.py writes transforms.json"):
+def test_colmap(tmp_path):
+    """X_camera = R·X + t, with R as a quaternion (w, x, y, z); as text and binary."""
+    half = math.sqrt(0.5)
+    flipped = np.array([0.0, half, 0.0, half])  # half a turn about x + z, which swaps x and z and negates y
+    turn = TURN.T  # from the world to the camera: its rows are right, down and forward
+    place = -turn @ [1, 2, 3]
+    (tmp_path / "cameras.txt").write_text("1 SIMPLE_RADIAL 800 600 400 400 300 0.1\n")
+    (tmp_path / "images.txt").write_text(f"1 {' '.join(map(str, [*flipped, *place]))} 1 a b.jpg\n\n")
+    lens = struct.pack("<QIiQQ4d", 1, 1, 2, 800, 600, 400, 400, 300, 0.1)
+    image = struct.pack("<QI7dI", 1, 1, *flipped, *place, 1) + b"a b.jpg\0" + struct.pack("<Q", 0)
+    found = read_poses(tmp_path / "images.txt")
+    (tmp_path / "cameras.bin").write_bytes(lens)
+    (tmp_path / "images.bin").write_bytes(image)
+    found += read_poses(tmp_path / "images.bin")
+    for camera in found:
+        assert camera.name == "a b.jpg"
+        assert camera.eye == pytest.approx((1, 2, 3))
+        assert camera.forward == pytest.approx((1, 0, 0))
+        assert camera.up == pytest.approx((0, 1, 0))
+        assert camera.field_of_view == pytest.approx(math.pi / 2)
+    (tmp_path / "images.bin").write_bytes(bytes(8))
+    with pytest.raises(InputError, match="has no cameras"):
         read_poses(tmp_path / "images.bin")
+    (tmp_path / "images.bin").write_bytes(image[:-9])
+    with pytest.raises(InputError, match="truncated"):
+        read_poses(tmp_path / "images.bin")
+
+
+def test_other_endings_are_named(tmp_path):
+    with pytest.raises(InputError, match=r"transforms.json \(NeRF, nerfstudio\)"):
+        read_poses(tmp_path / "poses.npy")

@@ -47,21 +47,41 @@ def read(model: Path, pictures: Path, *, files_outside: bool = False) -> Photogr
         InputError: a truncated or damaged file, a camera model that is not supported, a picture that is missing or
             outside its folder.
     """
-    binary = (model / "images.bin").is_file() and (model / "cameras.bin").is_file()
-    ending = ".bin" if binary else ".txt"
-    lenses = dict((_cameras if binary else _cameras_in_text)(model / f"cameras{ending}"))
-    file, found = model / f"images{ending}", []
-    for quaternion, translation, camera, name in (_images if binary else _images_in_text)(file):
-        if camera not in lenses:
-            raise InputError(f"{file}: {name} is of camera {camera}, which cameras{ending} does not state")
-        rotation = _rotation(quaternion, f"{file}: {name}")
-        picture = picture_file(pictures, name, str(file), files_outside)
-        found.append(Photograph(picture, lenses[camera], rotation, -rotation.T @ translation))
+    found = []
+    for name, lens, rotation, centre in poses(model):
+        picture = picture_file(pictures, name, str(model), files_outside)
+        found.append(Photograph(picture, lens, rotation, centre))
+    ending = _ending(model)
+    binary = ending == ".bin"
     points = model / f"points3D{ending}"
     places = None
     if points.is_file():
         places = np.array(list((_points if binary else _points_in_text)(points)), float).reshape(-1, 3)
     return Photographs(f"{FORMAT}, {'binary' if binary else 'text'}", model, tuple(found), places)
+
+
+def poses(model: Path) -> Iterator[tuple[str, LensModel, NDArray[np.float64], NDArray[np.float64]]]:
+    """The name, the camera model, the rotation from the world and the centre of each photograph of a model.
+
+    Args:
+        model: folder with ``cameras`` and ``images``, ``.bin`` or ``.txt``. The pictures need not exist.
+
+    Raises:
+        InputError: a truncated or damaged file, or a camera model that is not supported.
+    """
+    ending = _ending(model)
+    binary = ending == ".bin"
+    lenses = dict((_cameras if binary else _cameras_in_text)(model / f"cameras{ending}"))
+    file = model / f"images{ending}"
+    for quaternion, translation, camera, name in (_images if binary else _images_in_text)(file):
+        if camera not in lenses:
+            raise InputError(f"{file}: {name} is of camera {camera}, which cameras{ending} does not state")
+        rotation = _rotation(quaternion, f"{file}: {name}")
+        yield name, lenses[camera], rotation, -rotation.T @ translation
+
+
+def _ending(model: Path) -> str:
+    return ".bin" if (model / "images.bin").is_file() and (model / "cameras.bin").is_file() else ".txt"
 
 
 def _rotation(quaternion: NDArray[np.float64], where: str) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Cameras with positions and directions: transforms.json of NeRF, and cameras.json of 3D Gaussian splatting.
+"""Cameras with positions and directions, without their photographs: of NeRF, 3D Gaussian splatting and COLMAP.
 
 Sources: the documentation of instant-ngp and nerfstudio ("Data conventions"): ``transform_matrix`` maps camera to
 world coordinates, with x right, y up and z backwards; the code release of Kerbl et al. 2023: ``rotation`` maps
@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded, read_text, reading
+from vcc.base.reading import check_file, expanded, read_text, reading
+from vcc.formats import colmap
+from vcc.formats.lens_models import LensModel
 
 Vector = tuple[float, float, float]
 
@@ -44,7 +46,8 @@ def read_poses(path: str | PathLike[str]) -> list[PosedCamera]:
     """Read the cameras of a scene; principal points and distortions are ignored.
 
     Args:
-        path: ``transforms.json`` of NeRF, instant-ngp or nerfstudio, or ``cameras.json`` of 3D Gaussian splatting.
+        path: ``transforms.json`` of NeRF, instant-ngp or nerfstudio, ``cameras.json`` of 3D Gaussian splatting, or
+            ``images.bin`` or ``images.txt`` of COLMAP, next to its ``cameras``.
 
     Returns:
         The cameras, in the order of the file.
@@ -54,10 +57,17 @@ def read_poses(path: str | PathLike[str]) -> list[PosedCamera]:
             invalid.
     """
     found = expanded(path)
+    if found.name in ("images.bin", "images.txt"):
+        check_file(found, "file of cameras")
+        with reading(found, "cameras with poses"):
+            cameras = [_of_colmap(*pose) for pose in colmap.poses(found.parent)]
+            if not cameras:
+                raise InputError("it has no cameras")
+            return cameras
     if found.suffix.lower() != ".json":
         raise InputError(
-            f"{found} is no file of cameras: transforms.json (NeRF, nerfstudio) and cameras.json (3D Gaussian "
-            "splatting) are supported. For COLMAP, ns-process-data or colmap2nerf.py writes transforms.json"
+            f"{found} is no file of cameras: transforms.json (NeRF, nerfstudio), cameras.json (3D Gaussian "
+            "splatting) and images.bin or images.txt (COLMAP) are supported"
         )
     text = read_text(found, "file of cameras")
     with reading(found, "cameras with poses"):
@@ -86,6 +96,11 @@ def _of_transforms(number: int, frame: dict[str, Any]) -> PosedCamera:
             f"camera {name} has neither w and fl_x nor a camera_angle_x between 0 and π: {angle!r:.40}"
         )
     return _camera(name, matrix * [1, -1, -1, 1], float(angle))
+
+
+def _of_colmap(name: str, lens: LensModel, rotation: Any, centre: Any) -> PosedCamera:
+    angle = _angle(lens.width, lens.focal_lengths[0], name)
+    return _camera(name, np.column_stack([rotation.T, centre]), angle)
 
 
 def _of_splatting(number: int, frame: dict[str, Any]) -> PosedCamera:

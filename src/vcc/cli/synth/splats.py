@@ -66,8 +66,8 @@ class Standing:
     """The position and direction of the middle view.
 
     Args:
-        camera_from: Cameras of the scene: transforms.json (NeRF, nerfstudio) or cameras.json (3D Gaussian
-            splatting), in the coordinates of the splats.
+        camera_from: Cameras of the scene: transforms.json (NeRF, nerfstudio), cameras.json (3D Gaussian
+            splatting) or images.bin (COLMAP), in the coordinates of the splats.
         camera: Number of a camera, of --camera-from or as --look lists them.
         eye: Position of the middle view, in the scene's units, in place of a camera.
         target: The point that it faces, with --eye.
