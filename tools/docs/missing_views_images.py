@@ -39,9 +39,7 @@ def main(folder: Path = HERE) -> None:
     rows, columns = np.nonzero(star)
     axes[0].plot(columns, rows, "o", color=style.INK, markersize=5)
     axes[0].add_patch(_frame(*PLACE))
-    axes[0].set_title(
-        "33 given views (dots),\nestimated error of the others", fontsize=style.SMALL, color=style.INK
-    )
+    axes[0].set_title("given (dots), estimated error", fontsize=style.SMALL, color=style.INK)
     axes[0].set(xticks=[], yticks=[])
     bar = figure.colorbar(drawn, ax=axes[0], shrink=0.85, aspect=25)
     bar.ax.tick_params(labelsize=style.SMALL)
