@@ -23,6 +23,7 @@ from vcc.gallery import (
     heterodyne,
     integral_lens_prism,
     plenoptic,
+    real_lens,
     wavefront_coding,
 )
 from vcc.gallery.entry import Entry
@@ -69,6 +70,7 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
     each.name: (each, made)
     for each, made in (
         (conventional.ENTRY, lambda bench: bench.conventional(bench.middle)),
+        (real_lens.ENTRY, real_lens.camera_of),
         (heterodyne.ENTRY, lambda bench: heterodyne.designed(bench, heterodyne.on_axis(bench.light_field))),
         (coded_aperture_refocusing.ENTRY, _refocusing),
         (coded_aperture_depth.ENTRY, _depth),

@@ -10,6 +10,7 @@ from vcc.gallery.entry import Entry
 
 ENTRIES = (
     "conventional",
+    "real-lens",
     "heterodyne",
     "coded-aperture-refocusing",
     "coded-aperture-depth",

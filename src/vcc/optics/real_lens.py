@@ -260,16 +260,20 @@ class RealLens(Element):
         """
         distance = self._pupil_distance
         widest = None if seen is None else self._widest_seen(distance, seen)
-        if widest is None:
-            widest = self._widest(distance)
-        steps = math.ceil(math.log(widest) / math.log1p(PUPIL_STEP) + 0.5)
-        disc = Faces(transmission=Circle(2 * (1 + PUPIL_STEP) ** steps))
+        radius = self.exit_window[1] if widest is None else _rounded_up(widest)
+        disc = Faces(transmission=Circle(2 * radius))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
 
     def faces(self) -> Faces:
         """No faces: the effect of a thick element is between its planes; see `parts`."""
         return Faces()
+
+    @property
+    @cached
+    def exit_window(self) -> tuple[float, float]:
+        """(distance from the end of the element, radius) of a disc that all light leaving passes, metres."""
+        return self._pupil_distance, _rounded_up(self._widest(self._pupil_distance))
 
     @property
     @cached
@@ -424,6 +428,11 @@ def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float
         near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
         points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
     return float(away.max())
+
+
+def _rounded_up(radius: float) -> float:
+    """The next power of 1 + PUPIL_STEP, half a step or more above a radius, metres."""
+    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 0.5))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:
