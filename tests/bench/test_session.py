@@ -386,7 +386,6 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
 
     monkeypatch.setattr(imaging_there, "take", noted)
     monkeypatch.setattr(imaging_there, "SLOW", np.inf)
-    monkeypatch.setattr(imaging_there, "QUICK", np.inf)
     monkeypatch.setattr(session_there, "LINGER", 0.01)
     client = Client()
     client.do("hello", turn=1)

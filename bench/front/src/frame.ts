@@ -90,8 +90,8 @@ export class Frame {
       if (z < from) this.middle.z -= from - z + spare;
       else if (z > to) this.middle.z += z - to + spare;
     }
-    if (z > this.range.end - spare) this.range = { ...this.range, end: z + 2 * spare };
-    if (z < this.range.start + spare) this.range = { ...this.range, start: z - 2 * spare };
+    if (z > this.range.end) this.range = { ...this.range, end: z + spare };
+    if (z < this.range.start) this.range = { ...this.range, start: z - spare };
   }
 
   private keepWithin(): void {

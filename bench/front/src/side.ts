@@ -22,6 +22,8 @@ const WHEEL = 0.0022;
 /** In a wider drawing all rays are named, in a narrower one those of the axis. */
 const ALL_RAYS = 500;
 const KEY_PAUSE = 500;
+/** A part that is dragged so close to the border of the drawing, pixels, takes the border with it. */
+const EDGE = 8;
 /** Of the magnifier, pixels; what is closer than this to the sensor or to where rays meet is shown in it. */
 const LENS = { width: 156, height: 88 };
 const CLOSE = 26;
@@ -232,7 +234,8 @@ export class SideView extends Part {
     if (!drag.moved && Math.abs(scale.x(z) - scale.x(drag.from)) < 2) return;
     this.drag = { ...drag, z, snap, moved: true };
     this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(z), true);
-    this.frame.reach(z, this.width, this.height);
+    // Only at the very border: a drawing whose scale changed under the hand would run away.
+    if (point.x < EDGE || point.x > this.width - EDGE) this.frame.reach(z, this.width, this.height);
   }
 
   private lift(event: PointerEvent): void {

@@ -15,7 +15,7 @@ from vcc.base.progress import Progress
 from vcc.bench import messages
 from vcc.bench.document import Document
 from vcc.bench.editing import Editing
-from vcc.bench.pace import Pace
+from vcc.bench.pace import MOST_KINDS, Pace
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken, out_of_focus, take
 from vcc.bench.side import scene_distances
 from vcc.files.camera_reading import TrainAsWritten
@@ -25,8 +25,6 @@ from vcc.plot.fans import focused_distance
 
 SLOW = 0.4
 """Expected time, seconds, above which a coarse image is shown before the whole one."""
-QUICK = 0.1
-"""Expected time, seconds, up to which a whole image is rehearsed, too."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Imaging:
         self._turn = editing.offered.turn
         self._pace = Pace()
         self._parts: dict[Fineness, Parts] = {}
-        self._rehearsed: set[Hashable] = set()
+        self._rehearsals: dict[Hashable, list[tuple[bool, Fineness]]] = {}
         self._of: Document | None = None
         self.taken: Taken | None = None
 
@@ -165,28 +163,44 @@ class Imaging:
 
     def is_rehearsed(self) -> bool:
         """Whether nothing is left to rehearse, or rehearsing is useless because no whole image is shown."""
-        return self.taken is None or self.taken.coarse or self._kind() in self._rehearsed
+        if self.taken is None or self.taken.coarse:
+            return True
+        kind = self._kind()
+        if kind not in self._rehearsals:
+            self._rehearsals[kind] = self._steps()
+            while len(self._rehearsals) > MOST_KINDS:
+                del self._rehearsals[next(iter(self._rehearsals))]
+        return not self._rehearsals[kind]
 
-    def rehearse(self) -> None:
-        """Prepare the first images of a drag: coarser light fields, compiled code, times.
+    def _steps(self) -> list[tuple[bool, Fineness]]:
+        """The images to rehearse: whether out of focus, and how fine.
 
         If the image is made by rays, the whole image has compiled all code already, and images out of focus
-        are made in the same way.
+        are made in the same way. Without rays, images with fewer rays are the same.
         """
-        self._rehearsed.add(self._kind())
         by_rays = self.taken is not None and self.taken.by_rays
-        quick = not by_rays and (self._pace.seconds(self._kind()) or math.inf) <= QUICK
-        present = self._editing.train
-        for train in (present,) if by_rays else (out_of_focus(present), present):
-            described = replace(self._editing.described, train=train)
-            for fineness in (WHOLE, *COARSER) if quick else COARSER:
-                if not by_rays and fineness.rays != COARSER[0].rays and fineness.pixels == COARSER[0].pixels:
-                    continue  # the same as the one before
-                try:
-                    taken = self.take(fineness, described=described)
-                except (InputError, MemoryError):
-                    break
-                self._pace.noted(self._kind(described), fineness, taken)
+        quick = not by_rays and (self._pace.seconds(self._kind()) or math.inf) <= SLOW
+        every = [each for each in COARSER if by_rays or each.pixels != 2 or each.rays == COARSER[0].rays]
+        levels = [WHOLE, *every] if quick else every
+        return [(away, each) for away in ((False,) if by_rays else (True, False)) for each in levels]
+
+    def rehearse(self) -> None:
+        """Prepare the first images of a drag by one more image: coarser light fields, compiled code, times.
+
+        An image that is interrupted is made at the next call.
+        """
+        steps = self._rehearsals.get(self._kind(), [])
+        if self.is_rehearsed() or not steps:
+            return
+        away, fineness = steps[0]
+        present = self._editing.described
+        described = replace(present, train=out_of_focus(present.train)) if away else present
+        try:
+            self._pace.noted(self._kind(described), fineness, self.take(fineness, described=described))
+        except (InputError, MemoryError):
+            steps[:] = [each for each in steps if each[0] is not away]
+            return
+        del steps[0]
 
     # --- warnings ---
 

@@ -42,7 +42,7 @@ Send = Callable[[Json, Sequence[bytes]], None]
 
 LINGER = 2.0
 """Seconds that the thread waits for more work before it ends."""
-PAUSE = 0.1
+PAUSE = 0.05
 """Seconds of idleness after which images are rehearsed."""
 
 log = logging.getLogger("vcc.bench")
