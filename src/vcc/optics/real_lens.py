@@ -260,7 +260,7 @@ class RealLens(Element):
         """
         distance = self._pupil_distance
         widest = None if seen is None else self._widest_seen(distance, seen)
-        radius = self.exit_window[1] if widest is None else _rounded_up(widest)
+        radius = self._exit_radius if widest is None else _rounded_up(widest)
         disc = Faces(transmission=Circle(2 * radius))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
@@ -271,9 +271,9 @@ class RealLens(Element):
 
     @property
     @cached
-    def exit_window(self) -> tuple[float, float]:
-        """(distance from the end of the element, radius) of a disc that all light leaving passes, metres."""
-        return self._pupil_distance, _rounded_up(self._widest(self._pupil_distance))
+    def _exit_radius(self) -> float:
+        """Radius of a disc in the exit pupil that all light leaving the lens passes, metres."""
+        return _rounded_up(self._widest(self._pupil_distance))
 
     @property
     @cached
