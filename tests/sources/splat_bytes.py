@@ -34,7 +34,7 @@ def spz(version: int, degree: int = 1, count: int = 2, flags: int = 1, parts: li
     streams = spz_parts(version, degree) if parts is None else parts
     head = struct.pack("<4sIIBBB", b"NGSP", version, count, degree, 12, flags)
     if version < 4:
-        return gzip.compress(head + b"\0" + b"".join(streams))
+        return gzip.compress(head + b"\0" + b"".join(streams), mtime=0)
     streams = [part for part in streams if part]
     packed = [imagecodecs.zstd_encode(part) for part in streams]
     sizes = b"".join(struct.pack("<QQ", len(p), len(part)) for p, part in zip(packed, streams, strict=True))

@@ -207,7 +207,7 @@ HUGE[1, fields(0).index("scale_1")] = 200
         ("a.spz", spz(4, count=3), "stream 0 of the .spz states"),
         ("a.spz", spz(4)[:-4], "bytes are left"),
         ("a.spz", spz(4)[:30], "truncated or damaged"),
-        ("a.spz", gzip.compress(b"NGSP" + struct.pack("<II", 1, 2) + bytes(99)), "version 1"),
+        ("a.spz", gzip.compress(b"NGSP" + struct.pack("<II", 1, 2) + bytes(99), mtime=0), "version 1"),
         ("a.glb", b"glTF" + bytes(30), "not JSON"),
         ("a.ksplat", b"", "read from .ply, .splat"),
     ],
