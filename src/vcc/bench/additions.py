@@ -170,8 +170,8 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
         raise InputError(f"unknown kind of element {shown(kind)}: use one of {', '.join(ELEMENT_KINDS)}")
     if kind in FROM_FILES:
         raise InputError(
-            f"a {kind.replace('_', ' ')} comes from a lens file: name it in the camera file with which you start the "
-            "bench, or open a camera that has one"
+            f"a {kind.replace('_', ' ')} comes from a lens file: name it in the camera file with which you start "
+            "the bench, or open a camera that has one"
         )
     place = _suitable_place(kind, train) if z is None else units.parse(z, "length", "z")
     given = _length(place, 6) if z is None else z
