@@ -25,6 +25,7 @@ from vcc.bench import imaging as imaging_there
 from vcc.bench import offered as offered_there
 from vcc.bench import picture as picture_there
 from vcc.bench import session as session_there
+from vcc.bench.additions import FROM_FILES
 from vcc.bench.document import Document
 from vcc.bench.inbox import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.bench.offered import Field
@@ -148,7 +149,12 @@ def test_elements_are_added_copied_and_removed(client):
     assert "there is no element 5" in client.until("refused")[0]["words"]
 
 
-@pytest.mark.parametrize("kind", list(ELEMENT_KINDS))
+def test_kind_that_comes_from_a_file_is_not_added_and_the_way_out_is_named(client):
+    client.do("add", kind="real_lens", z="13 mm")
+    assert "comes from a lens file" in client.until("refused")[0]["words"]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in ELEMENT_KINDS if kind not in FROM_FILES])
 def test_each_kind_can_be_added_and_drawn(client, kind):
     client.do("add", kind=kind, z="13 mm")
     state, _ = client.until("state", "refused")

@@ -62,7 +62,7 @@ export class EditorView extends Part {
       </div>
       <div class="adds"><select aria-label="Add an element" @change=${this.add}>
         <option value="" selected>+ Add …</option>
-        ${bench.parts.kinds.map((kind) => html`<option value=${kind.kind} title=${kind.words}>${kind.kind.replaceAll("_", " ")}</option>`)}</select></div>
+        ${bench.parts.kinds.filter((kind) => kind.addable !== false).map((kind) => html`<option value=${kind.kind} title=${kind.words}>${kind.kind.replaceAll("_", " ")}</option>`)}</select></div>
       <div id="form" class="form" role="tabpanel" aria-labelledby="tab-${bench.selected}">${this.form()}</div>`;
   }
 

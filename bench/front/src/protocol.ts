@@ -47,10 +47,11 @@ export interface Parameter {
   parameters?: Parameter[];
 }
 
-/** A kind of element or pattern. */
+/** A kind of element or pattern; of elements, whether a bench can add one. */
 export interface Kind {
   kind: string;
   words: string;
+  addable?: boolean;
   parameters: Parameter[];
 }
 

@@ -46,7 +46,7 @@ _ARRAY_LIKE = set(get_args(ArrayLike))
 @functools.cache
 def kinds() -> list[Json]:
     """All kinds of elements, with their parameters."""
-    return [_kind(name, kind) for name, kind in ELEMENT_KINDS.items()]
+    return [_kind(name, kind) | {"addable": name not in FROM_FILES} for name, kind in ELEMENT_KINDS.items()]
 
 
 @functools.cache
@@ -168,6 +168,11 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
     """
     if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
         raise InputError(f"unknown kind of element {shown(kind)}: use one of {', '.join(ELEMENT_KINDS)}")
+    if kind in FROM_FILES:
+        raise InputError(
+            f"a {kind.replace('_', ' ')} comes from a lens file: name it in the camera file with which you start "
+            "the bench, or open a camera that has one"
+        )
     place = _suitable_place(kind, train) if z is None else units.parse(z, "length", "z")
     given = _length(place, 6) if z is None else z
     long, wide = max(train.sensor.z, 1e-3), _width_at(train, place)
@@ -180,6 +185,8 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
 
 LENSLET_PIXELS = 8
 """Pixels of the sensor across a new lenslet."""
+FROM_FILES = ("real_lens",)
+"""Kinds that a bench shows and changes, but cannot add."""
 IN_GAPS = ("lens", "first_order")
 BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")
 

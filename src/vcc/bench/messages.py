@@ -71,10 +71,11 @@ class Parameter(TypedDict):
 
 
 class Kind(TypedDict):
-    """A kind of element or pattern."""
+    """A kind of element or pattern; of elements, whether a bench can add one."""
 
     kind: str
     words: str
+    addable: NotRequired[bool]
     parameters: list[Parameter]
 
 

@@ -193,7 +193,7 @@ async function vt(n,i){let e=new Blob([n]).stream().pipeThrough(i);return new Ui
       </div>
       <div class="adds"><select aria-label="Add an element" @change=${this.add}>
         <option value="" selected>+ Add …</option>
-        ${i.parts.kinds.map(t=>d`<option value=${t.kind} title=${t.words}>${t.kind.replaceAll("_"," ")}</option>`)}</select></div>
+        ${i.parts.kinds.filter(t=>t.addable!==!1).map(t=>d`<option value=${t.kind} title=${t.words}>${t.kind.replaceAll("_"," ")}</option>`)}</select></div>
       <div id="form" class="form" role="tabpanel" aria-labelledby="tab-${i.selected}">${this.form()}</div>`}form(){let{selected:i}=this.bench;if(i==="light field")return this.lightField();let e=i==="sensor"?this.bench.document.camera.sensor:this.bench.elements[i],t=i==="sensor"?null:this.kindOf(i),s=i==="sensor"?this.bench.parts.sensor:t?.parameters;return!e||!s?u:d`
       <div class="head"><span class="quiet" title=${t?.words??""}>${[String(e.kind??"").replaceAll("_"," "),...this.bench.partOf(i)?.label.slice(1)??[]].filter(Boolean).join(", ")}</span>${i==="sensor"?u:this.verbs(i)}</div>
       ${this.bench.notesOf(i).map(r=>d`<p class="advice">${r.words}</p>`)}
