@@ -73,7 +73,7 @@ def test_the_entry_runs_on_a_light_field_of_one_s_own():
     field = SCENE.light_field(
         (9, 9), (64, 64), spacing=20 * mm / 9, slope_per_pixel=0.4 / 64, focus_distance=1.2, dtype="float32"
     )
-    result = real_lens.Run(rays=32, point_rays=256)(bench_for(field), silent)
+    result = real_lens.Run(rays=32, point_rays=256, detail=21)(bench_for(field), silent)
     assert all(number.reached is not False for number in result.numbers), result.numbers
     assert len(result.numbers) == 8
     assert [len(row) for row in result.pictures] == [3, 1, 1, 1]

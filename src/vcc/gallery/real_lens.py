@@ -83,9 +83,17 @@ class Setup:
     def _sensor(self) -> Sensor:
         return Sensor(z=0, shape=self.shape, pitch=self.pitch)
 
-    def real(self, f_number: float, by: Any = "spot") -> Camera:
-        """The lens with its aberrations, focused by the smallest spot on the axis."""
-        return Camera.focused([_lens(f_number, "real")], self._sensor, self.focus).focused_at(self.focus, by=by)
+    @property
+    @cached
+    def real(self) -> dict[float, Camera]:
+        """By f-number: the lens with its aberrations, focused by the smallest spot on the axis."""
+        return {
+            f_number: self.paraxial(f_number).focused_at(self.focus, by="spot") for f_number in (OPEN, STOPPED)
+        }
+
+    def paraxial(self, f_number: float) -> Camera:
+        """The same, focused by first order."""
+        return Camera.focused([_lens(f_number, "real")], self._sensor, self.focus)
 
     def first_order(self, f_number: float) -> Camera:
         """The same lens without aberrations and rims."""
@@ -140,19 +148,21 @@ class Run:
     Args:
         rays: of a pixel of scenes.
         point_rays: of a pixel of captured points and even scenes.
+        detail: pixels across the drawn images of points.
     """
 
     rays: int = 256
     point_rays: int = 1024
+    detail: int = 121
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Capture a light field, and measure."""
         setup, step = Setup.of(bench), Steps(progress, 6)
         cameras = {
             f"thin lens, f/{OPEN:g}": setup.thin(OPEN),
-            f"real lens, f/{OPEN:g}": setup.real(OPEN),
+            f"real lens, f/{OPEN:g}": setup.real[OPEN],
             f"thin lens, f/{STOPPED:g}": setup.thin(STOPPED),
-            f"real lens, f/{STOPPED:g}": setup.real(STOPPED),
+            f"real lens, f/{STOPPED:g}": setup.real[STOPPED],
         }
         images: dict[str, Image] = {}
         for name, camera in cameras.items():
@@ -179,7 +189,7 @@ class Run:
             views=setup.field.shape[0],
             focal_length=_lens(OPEN, "real").focal_length,
         )
-        return Result(text, _pictures(setup, images, even), tuple(numbers), bench.assumed)
+        return Result(text, _pictures(setup, images, even, self.detail), tuple(numbers), bench.assumed)
 
 
 # -- findings: images
@@ -254,7 +264,7 @@ def _spot(setup: Setup, rays: int) -> Finding:
     behind, slopes = _longitudinal(lens, setup.focus, heights)
     expected = math.sqrt(float((heights * (behind * slopes) ** 2).sum() / heights.sum()))
     pitch = expected / 12
-    sensor = Sensor(setup.real(OPEN, "first order").sensor.z, (73, 73), pitch)
+    sensor = Sensor(setup.paraxial(OPEN).sensor.z, (73, 73), pitch)
     with warnings.catch_warnings():
         # The light field holds only the point: most of the sensor's rays are missing.
         warnings.simplefilter("ignore", ResultWarning)
@@ -291,7 +301,7 @@ def _point(setup: Setup, width: float) -> LightField:
 
 def _petzval(setup: Setup) -> Finding:
     """Third order: the tangential focus lies three times as far from Petzval's surface as the sagittal one."""
-    camera, lens = setup.real(OPEN, "first order"), _lens(OPEN, "real")
+    camera, lens = setup.paraxial(OPEN), _lens(OPEN, "real")
     found = field_curvature(camera, setup.focus, fields=[NEAR_AXIS])
     height = NEAR_AXIS * setup.corner * setup.image_distance
     surface = float(3 * found.sagittal[0, 0] - found.tangential[0, 0]) / 2
@@ -316,7 +326,7 @@ def petzval_sum(prescription: Prescription) -> float:
 
 
 def _corner_foci(setup: Setup) -> str:
-    found = field_curvature(setup.real(OPEN), setup.focus, fields=[1.0])
+    found = field_curvature(setup.real[OPEN], setup.focus, fields=[1.0])
     return f"{found.sagittal[0, 0] / um:+.0f} µm (sagittal) and {found.tangential[0, 0] / um:+.0f} µm (tangential)"
 
 
@@ -326,7 +336,7 @@ def _even(setup: Setup, f_number: float, rays: int) -> Array:
     even = LightField.from_views(
         np.ones((views, views, pixels, pixels, 1), np.float32), WIDTH / views, slope * 2 / pixels, setup.focus
     )
-    camera = setup.real(f_number)
+    camera = setup.real[f_number]
     height = setup.corner * setup.image_distance
     values = []
     for field in FIELDS:
@@ -400,20 +410,22 @@ def _illumination(setup: Setup, even: dict[float, Array]) -> Iterator[Finding]:
 # -- pictures
 
 
-def _pictures(setup: Setup, images: dict[str, Image], even: dict[float, Array]) -> tuple[tuple[Picture, ...], ...]:
+def _pictures(
+    setup: Setup, images: dict[str, Image], even: dict[float, Array], detail: int
+) -> tuple[tuple[Picture, ...], ...]:
     shown = {
         name: figures.shown(image, setup.exposure(STOPPED if name.endswith(f"{STOPPED:g}") else OPEN))
         for name, image in images.items()
     }
-    thin, real, _, stopped = (Picture(*each) for each in (
-        (f"scene-{n}", name[0].upper() + name[1:], caption, shown[name])
+    thin, real, _, stopped = (
+        Picture(f"scene-{n}", name.capitalize(), caption, shown[name])
         for n, (name, caption) in enumerate(zip(images, _CAPTIONS, strict=True))
-    ))  # fmt: skip
+    )
     columns = list(shown.items())
     return (
         (thin, real, stopped),
         (Picture("close-ups", "Close-ups", _CLOSE_UPS, _close_ups(setup, columns)),),
-        (Picture("points", "Points over the field", _POINTS, _point_figure(setup)),),
+        (Picture("points", "Points over the field", _POINTS, _point_figure(setup, detail)),),
         (Picture("curves", "Aberrations and light", _CURVES, _curve_figure(setup, even)),),
     )
 
@@ -446,8 +458,8 @@ def _close_ups(setup: Setup, columns: list[tuple[str, figures.Shown]]) -> Figure
     return figures.close_ups(columns, [crop for _, crop in wide], [name for name, _ in wide])
 
 
-def _point_figure(setup: Setup) -> Figure:
-    cameras = ((f"f/{OPEN:g}", setup.real(OPEN)), (f"f/{STOPPED:g}", setup.real(STOPPED)))
+def _point_figure(setup: Setup, detail: int) -> Figure:
+    cameras = ((f"f/{OPEN:g}", setup.real[OPEN]), (f"f/{STOPPED:g}", setup.real[STOPPED]))
     blur = _pupil(OPEN) * setup.image_distance * abs(1 / setup.far - 1 / setup.focus)
     figure = figures.new_figure(8.6, 6.8)
     grid = figure.subplots(4, 5)
@@ -457,7 +469,14 @@ def _point_figure(setup: Setup) -> Figure:
         for row, (name, camera) in enumerate(cameras):
             for axes, field in zip(grid[2 * half + row], FIELDS, strict=True):
                 slope = field * setup.corner / math.sqrt(2)
-                spread = psf(camera, distance, (slope, slope), pitch=width / 121, shape=(121, 121)).values
+                spread = psf(
+                    camera,
+                    distance,
+                    (slope, slope),
+                    pitch=width / detail,
+                    shape=(detail, detail),
+                    cells=4 * detail,
+                ).values
                 brightest = np.quantile(spread[spread > 0], 0.995)
                 grey = figures.grey_shown(spread / brightest)
                 title = {0.0: "axis", 1.0: "corner"}.get(field, f"{field:g} of the way")
@@ -476,14 +495,14 @@ def _curve_figure(setup: Setup, even: dict[float, Array]) -> Figure:
     spherical.plot(_longitudinal(lens, setup.focus, heights)[0] / um, heights / mm, color=figures.ACCENT)
     spherical.axhline(_pupil(STOPPED) / 2 / mm, color=figures.QUIET, linewidth=0.8, linestyle="--")
     spherical.axvline(0, color=figures.QUIET, linewidth=0.6)
-    found = field_curvature(setup.real(OPEN, "first order"), setup.focus)
+    found = field_curvature(setup.paraxial(OPEN), setup.focus)
     heights = found.at.fields.heights / mm
     curved.plot(found.sagittal[:, 0] / um, heights, color=figures.ACCENT, label="sagittal")
     curved.plot(found.tangential[:, 0] / um, heights, color=figures.INK, label="tangential")
     curved.axvline(0, color=figures.QUIET, linewidth=0.6)
     corner = setup.corner * setup.image_distance / mm
     for f_number, tint in ((OPEN, figures.ACCENT), (STOPPED, figures.INK)):
-        curve = relative_illumination(setup.real(f_number), fields=np.linspace(0, 1, 13).tolist())
+        curve = relative_illumination(setup.real[f_number], fields=np.linspace(0, 1, 13).tolist())
         light.plot(np.array(curve.heights) / mm, curve.share, color=tint, label=f"f/{f_number:g}")
         light.plot(np.array(FIELDS) * corner, even[f_number], "o", color=tint, markersize=4)
     light.set_ylim(0, 1.05)

@@ -11,6 +11,7 @@ from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
+from vcc.optics.aberrations import Aberrations
 from vcc.optics.scatter import Scatter
 from vcc.optics.train import Stage, Train
 from vcc.plan.rays.points import FIRST_COLUMNS, columns_of
@@ -170,7 +171,14 @@ def _undone(stage: Stage) -> Affine:
 
 def in_one_plane(stages: tuple[Stage, ...]) -> list[int]:
     """The numbers of stages in the same plane as the stage before."""
-    return [n for n, stage in enumerate(stages) if n and np.array_equal(stage.approach.matrix, np.eye(5))]
+    return [
+        n
+        for n, stage in enumerate(stages)
+        if n
+        and np.array_equal(stage.approach.matrix, np.eye(5))
+        # Surfaces of a lens move rays within the plane: behind them the stop before them has another shape.
+        and not isinstance(stage.faces.bending, Aberrations)
+    ]
 
 
 def stops_in_one_plane(stages: tuple[Stage, ...]) -> tuple[int, ...]:
