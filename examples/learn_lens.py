@@ -173,7 +173,7 @@ def drawn_textures(count: int, generator: torch.Generator) -> torch.Tensor:
 
 
 class Decoder(torch.nn.Module):
-    """A small network for all fields; it is told the field."""
+    """A small network for all fields; a field's height is its second input."""
 
     def __init__(self) -> None:
         super().__init__()
