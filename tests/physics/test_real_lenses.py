@@ -66,7 +66,7 @@ def test_a_pinhole_sees_the_fourth_power_of_the_cosine():
     down = np.where(tangent == 0, across, x / np.where(tangent == 0, 1.0, tangent))
     expected = np.pi * (1 * mm) ** 2 / (across * down) / (1 + tangent**2) ** 2
     np.testing.assert_allclose(image, expected, atol=5 * found.sampling_error)  # 41 pixels: five standard errors
-    assert found.sampling_error < 3e-3 * expected.max()
+    assert found.sampling_error < 5e-3 * expected.max()
     assert image[0] < 0.62 * image[20]
     paraxial = vcc.Camera([replace(lens, radiometry="paraxial")], sensor).capture(even, samples=1024).values[0]
     # The stop of radius r adds r²/d² to the mean of the weight's inverse, 1/400, and less off the axis.

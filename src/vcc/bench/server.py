@@ -20,8 +20,9 @@ from urllib.parse import urlsplit
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.bench.carried import DamagedMessage, packed, unpacked
+from vcc.bench.inbox import Broken
 from vcc.bench.offered import Offered
-from vcc.bench.session import Broken, Session
+from vcc.bench.session import Session
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette

@@ -24,7 +24,7 @@ from vcc.bench.document import Document
 from vcc.bench.editing import Editing
 from vcc.bench.focusing import distance_at
 from vcc.bench.imaging import Imaging, Wanted
-from vcc.bench.inbox import CHANGES, Broken, Inbox, turn_of
+from vcc.bench.inbox import CHANGES, Inbox, turn_of
 from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
 from vcc.bench.picture import WHOLE, Taken
@@ -33,8 +33,6 @@ from vcc.bench.screen import Look
 from vcc.bench.side import side
 from vcc.bench.sweep import sweep_of
 from vcc.optics.focusing import focused_train
-
-__all__ = ["Broken", "Session"]
 
 Json = dict[str, Any]
 Send = Callable[[Json, Sequence[bytes]], None]

@@ -315,7 +315,7 @@ class RealLens(Element):
         reach = 2 * self._stop_radius
         for _ in range(6):
             p, q, angle = np.meshgrid(
-                np.linspace(0, seen.radius, 9), np.linspace(0, reach, 61), np.linspace(0, np.pi, 25), indexing="ij"
+                np.linspace(0, seen.radius, 7), np.linspace(0, reach, 41), np.linspace(0, np.pi, 13), indexing="ij"
             )
             points = np.stack([p.ravel(), q.ravel(), angle.ravel()], axis=-1)
             widest = float(met(points).max())
@@ -324,7 +324,7 @@ class RealLens(Element):
             reach *= 2
         if widest <= 0:
             return None
-        return _refined(points, met, np.array([seen.radius / 8, reach / 60, np.pi / 24]))
+        return _refined(points, met, np.array([seen.radius / 6, reach / 40, np.pi / 12]))
 
     def _widest(self, distance: float) -> float:
         """The same for light that goes anywhere: rays from all over the stop in all directions."""
@@ -422,17 +422,17 @@ class Seen:
 def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float:
     """The largest value of a function around the points of a grid where it is large, by repeated random steps."""
     draw, away = np.random.default_rng(0), met(points)
-    for _ in range(8):
-        best = np.argsort(away)[-40:]
+    for _ in range(7):
+        best = np.argsort(away)[-24:]
         points, away = points[best], away[best]
-        near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
+        near = (points + draw.uniform(-1, 1, (32, *points.shape)) * step).reshape(-1, points.shape[1])
         points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
     return float(away.max())
 
 
 def _rounded_up(radius: float) -> float:
-    """The next power of 1 + PUPIL_STEP, half a step or more above a radius, metres."""
-    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 0.5))
+    """A power of 1 + PUPIL_STEP, one to two steps above a radius that random rays found, metres."""
+    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 1))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:
