@@ -58,7 +58,7 @@ def test_rims_behind_a_thin_lens_appear_where_it_images_them():
         (f / 2, 0.0, 1.5, 10 * mm, False), (math.inf, gap, 1.0, 10 * mm, False), (math.inf, 0.0, 1.0, 4 * mm, True)
     )
     power = 1 / (2 * f / 2)  # (n − 1)/r
-    centres, radii = real_lens.discs(plano, 0.2)
+    centres, radii = real_lens.discs(plano, 0.2, math.inf)
     apparent = gap / (1 - gap * power)
     assert centres[-1] == pytest.approx(-0.2 * apparent, rel=1e-9)
     assert radii[-1] == pytest.approx(2 * mm * apparent / gap, rel=1e-9)

@@ -38,6 +38,7 @@ THUMBNAILS = {
     "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "focal-sweep": ("scene-restored", (0, 0.2, 0.5, 0.7)),
+    "coded-aperture-real-lens": ("psf", (0.52, 0.03, 0.76, 0.265)),
     "real-lens": ("points", (0.628, 0.036, 0.805, 0.262)),
     "coded-exposure": ("target", (0.68, 0.53, 1, 0.98)),
     "cassi": ("scene", (0.338, 0.033, 0.661, 0.492)),

@@ -86,6 +86,8 @@ CAMERAS: Mapping[str, tuple[Entry, Callable[[Bench], Train]]] = {
 LEFT_OUT: Mapping[str, str] = {
     "angle-sensitive-pixels": "its pixels respond by a tile of angles, so that an image is made of one for each "
     "kind of pixel, and the bench shows one: give the sensor of another camera one angular_response",
+    "coded-aperture-real-lens": "its target is flat and far off the axis, and the bench shows one scene: open "
+    "real-lens, and give its lens a mask",
     "good-apertures": "it compares many apertures of one lens, and is not a single camera: open "
     "coded-aperture-refocusing, and give its mask other cells",
     "light-field-rendering": "it renders views between those of a light field, and has neither lens nor sensor",

@@ -14,6 +14,7 @@ ENTRIES = (
     "heterodyne",
     "coded-aperture-refocusing",
     "coded-aperture-depth",
+    "coded-aperture-real-lens",
     "good-apertures",
     "light-field-rendering",
     "plenoptic",

@@ -26,8 +26,11 @@ from vcc.plan.rays.path import Leg, Path, stops_in_one_plane
 
 Array = NDArray[np.float64]
 
-ROUNDS = 8
-"""Largest number of iterations: the deflection of a plate depends on where rays meet it, and vice versa."""
+ROUNDS = 24
+"""Largest number of iterations: the deflection of a plate depends on where rays meet it, and vice versa.
+
+A wide mask in the stop of a real lens, seen from the corner, needs ten.
+"""
 ROOM = 1.1
 """Factor by which deflections may grow if the aim follows a camera."""
 SETTLED = 0.01
