@@ -297,8 +297,8 @@ def _findings(
             best["code"],
             "dB",
             best["code"] > best["round"],
-            f"recorded {seen['code', place].quality(seen['code', place].recording):.1f} dB; of the code’s light on "
-            f"the axis {_light(spreads, place):.0%} pass the rims",
+            f"recorded {seen['code', place].quality(seen['code', place].recording):.1f} dB; of the code’s light "
+            f"on the axis {_light(spreads, place):.0%} pass the rims",
         )
         others = {
             name: _mean_quality(seen["code", place], spreads["code", name].values) for name in ("thin", "axis")
@@ -353,8 +353,8 @@ def _mean_quality(seen: Seen, kernel: Array) -> float:
 
 _PSF = (
     "Out of focus, as light lands. The thin lens has the same code everywhere. The real lens at f/2 bends the "
-    "outer cells away, and its rims cut the code off the axis; stopped down to f/4, the code stays. Round openings have "
-    "the area of the code."
+    "outer cells away, and its rims cut the code off the axis; stopped down to f/4, the code stays. Round "
+    "openings have the area of the code."
 )
 _DEBLURRED = "As light lands, in linear light: the code’s recordings, deblurred with the kernels of both lenses."
 
