@@ -3,6 +3,7 @@
     pip install .
     python benchmarks/physical_laws.py                                      # 330 cameras; 66 by brute force
     python benchmarks/physical_laws.py --kind "one mask" --seed 5 --cameras 1   # one camera again, with words
+    python benchmarks/physical_laws.py --colour 100                         # cameras that see colour, instead
 
 Cameras, laws and the tracer are those of tests/physics (`random_cameras.py`, `laws.py`, `random_tracer.py`), of
 which a part runs in the tests. The laws are held on pictures of about 16 pixels a side, brute force on 32 (20
@@ -22,9 +23,12 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import numpy as np
+
 import vcc
 from tests.physics.laws import LAWS, Check, brute_force, dark
 from tests.physics.random_cameras import BENT, KINDS, drawn
+from tests.physics.random_colour import at_random
 
 
 def checks(kind: str, seed: int, laws: list[str], by_force: bool) -> Iterator[Check]:
@@ -65,6 +69,27 @@ def table(found: list[Check]) -> str:
     return "\n".join(lines)
 
 
+def coloured(first: int, count: int) -> int:
+    """Brute force on cameras that see direction and colour; the exit code."""
+    reached, failed, number = [], 0, first
+    while len(reached) < count:
+        try:
+            camera = at_random(number)
+            if camera.dark:
+                continue
+        except RuntimeError:  # asks for views that are too large to be held
+            continue
+        finally:
+            number += 1
+        here, required, note = camera.reached()
+        failed += here < required
+        reached.append(here)
+        print(f"{'FAILS' if here < required else 'holds'} {note}", flush=True)
+    quarters = np.percentile(reached, [0, 25, 50, 75, 100]).round(1).tolist()
+    print(f"{count} cameras, {failed} failures; dB, quartiles: {quarters}")
+    return 1 if failed else 0
+
+
 def main() -> int:
     """Run, print, and say by the exit code whether all holds."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -73,6 +98,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="the first (0)")
     parser.add_argument("--kind", choices=KINDS, help="one kind of camera only")
     parser.add_argument("--law", choices=[*LAWS, "brute force"], help="one law only")
+    parser.add_argument("--colour", type=int, default=0, help="so many cameras that see colour, instead (0)")
     given = parser.parse_args()
     kinds = [given.kind] if given.kind else list(KINDS)
     each, forced = -(-given.cameras // len(kinds)), -(-given.brute_force // len(kinds))
@@ -80,6 +106,8 @@ def main() -> int:
     by_force = given.law in (None, "brute force")
     # What a light field lacks is stated in warnings, and is no matter of laws.
     warnings.simplefilter("ignore", vcc.ResultWarning)
+    if given.colour:
+        return coloured(given.seed, given.colour)
     found: list[Check] = []
     started = time.perf_counter()
     for number in range(each):

@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import map_coordinates, maximum_filter, minimum_filter
 
 import vcc
+from vcc.files.transfer import from_linear
+from vcc.sources import CameraArray
+from vcc.sources.splats import SplatScene
 from vcc.sources.synthesis import synthesize
 from vcc.store import open_store
 
@@ -113,3 +116,27 @@ def test_the_script_renders_and_keeps_a_tiny_desk(tmp_path, monkeypatch):
     assert before.max() > 1  # lamps
     # Pictures of 16×24 noisy pixels: what the codec does to them is a few per cent of white.
     assert np.sqrt(np.mean((again - before) ** 2)) < 0.05
+
+
+def test_the_desk_as_splats_is_where_mitsuba_has_it(desk, disparity):
+    scene = SplatScene(DOCS / "data" / "desk.spz")
+    cameras = CameraArray((9, 9), (320, 480), SPACING, SLOPE, FOCUS)
+    # Balls are half a pixel wide, and nearer ones of a slope absorb first: depth is that of one of 3×3 pixels.
+    # The file has places to 1/8192 m, σ = 0.04 mm of rounding: du/slope · σ/Z² = 5e-4 pixels at 0.4 m.
+    found = scene.disparity_maps(cameras).values[0]
+    low, high = minimum_filter(disparity, 3) - 2e-3, maximum_filter(disparity, 3) + 2e-3
+    assert ((found > low) & (found < high)).mean() > 0.99
+    assert np.median(np.abs(found - disparity)) < 2e-3
+    # A view that was not used to make them: the best match of shifted views is the one that is not shifted.
+    row, column = 4, 2
+    found = from_linear(scene.render(cameras.camera(row, column)))
+    truth = desk[row : row + 1, column : column + 1].values[0, 0] * desk.provenance["full_scale"]
+    shown = np.minimum(from_linear(truth), 1)
+    errors = {
+        (y, x): float(np.mean((np.roll(np.minimum(found, 1), (y, x), (0, 1)) - shown)[4:-4, 4:-4] ** 2))
+        for y in (-1, 0, 1)
+        for x in (-1, 0, 1)
+    }
+    assert min(errors, key=errors.get) == (0, 0)
+    assert errors[0, 0] < 10**-2.7
+    assert sorted(errors.values())[1] > 2 * errors[0, 0]

@@ -6,6 +6,7 @@ notebooks hold what notebooks hold, which `tests/test_notebooks.py` runs.
 """
 
 import contextlib
+import json
 import re
 import shlex
 import shutil
@@ -184,13 +185,36 @@ def write_given():
     np.save("slopes.npy", np.zeros((3, 3, 2)))
     np.save("widths.npy", np.full((4, 4), 0.01))
     np.save("code.npy", np.eye(4))
+    write_photographs(Path("my_photographs"))
     write_views(Path("cotton"))
     for row, column in [(0, 1), (1, 0), (3, 4)]:
         Path(f"cotton/view_{row}_{column}.png").unlink()
     for name in ("camera.toml", "other.toml"):
         Path(name).write_text(CAMERA)
+    pose = {
+        "img_name": "front",
+        "width": 480,
+        "fx": 963,
+        "position": [0, 0, 0],
+        "rotation": np.diag([1, -1, -1]).tolist(),
+    }
+    Path("cameras.json").write_text(json.dumps([pose]))
     write_depths()
     write_raw()
+
+
+def write_photographs(folder):
+    """A row of photographs with poses."""
+    (folder / "images").mkdir(parents=True)
+    y, x = np.mgrid[:40, :60]
+    frames = []
+    for n in range(4):
+        wave = 0.5 + 0.2 * np.sin((x + 2 * n) / 2.5) + 0.2 * np.cos(y / 3 + (x + 2 * n) / 7)
+        png(folder / "images" / f"{n}.png", np.stack([wave, wave, wave], axis=-1))
+        matrix = [[1, 0, 0, n / 2], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
+        frames.append({"file_path": f"images/{n}.png", "transform_matrix": matrix})
+    said = {"fl_x": 80, "w": 60, "h": 40, "frames": frames}
+    (folder / "transforms.json").write_text(json.dumps(said))
 
 
 def write_depths():

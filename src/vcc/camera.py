@@ -16,16 +16,16 @@ from vcc.base import checks, lazy_import
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.progress import Progress, part_of
 from vcc.base.wavelengths import wavelength as checked_wavelength
+from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples, check_is_light_field
 from vcc.files.camera_writing import write_train
 from vcc.image import Image, PhotodiodeImage, interleaved
 from vcc.optics.band import Band
-from vcc.optics.bands import refuse, single_way, trains_of
+from vcc.optics.bands import SameWay, single_way, trains_of
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
 from vcc.optics.focusing import By, focused_train, refocused_train
 from vcc.optics.plenoptic import Plenoptic
-from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best, compiled_each, mixture_of
@@ -34,11 +34,21 @@ from vcc.plan.model import Plan
 from vcc.plan.protocol import OutputBuffers
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
-from vcc.run.bands import BandImages, SomeChannels, as_share, bands_as_text, largest_shares, once_each, read_once
+from vcc.run.bands import (
+    BandImages,
+    BandPlans,
+    SomeChannels,
+    as_share,
+    bands_as_text,
+    largest_shares,
+    once_each,
+    read_once,
+    response_matrix,
+)
 from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
-from vcc.run.operator import Operator
+from vcc.run.operator import BandOperator, LinearMap, Operator
 from vcc.run.operators import carried_to
 
 Field = TypeVar("Field", bound=InMemory)
@@ -49,13 +59,12 @@ def _warn_of(cautions: Iterable[str]) -> None:
         warn_of_result(caution)
 
 
-def _check_no_plan(plan: Plan | None) -> None:
-    """Refuse one plan for a camera that has one for each band."""
-    if plan is not None:
-        raise InputError(
-            "plan= is one plan, and this camera depends on the wavelength or the channel, so that it has one for "
-            "each band: leave it out"
-        )
+def _plan_of(train: Train, light_field: Samples, how: How, progress: Progress | None = None) -> Plan:
+    """The plan of a train that all channels of a light field take."""
+    light_field.check_complete()
+    if how.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
+        light_field.grid.disparities.maps(progress)  # now, so that progress is reported
+    return compile_best(train, light_field.grid, how)
 
 
 def _check_of_the_run(options: Options) -> None:
@@ -230,7 +239,7 @@ class Camera(Train):
         *,
         progress: Progress | None = None,
         **options: Unpack[Options],
-    ) -> Plan:
+    ) -> Plan | BandPlans:
         """Make the plan by which an engine computes the image; `capture` does this automatically.
 
         Args:
@@ -238,21 +247,42 @@ class Camera(Train):
             how: as in `capture`.
             progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
+
+        Returns:
+            A plan; for elements that depend on the wavelength or the channel, and a sensor with a response, a plan
+            for each group of bands (`vcc.run.bands.BandPlans`).
+
+        Raises:
+            InputError: as for `capture`; or pixels that have several photodiodes or angular responses.
         """
         check_is_light_field(light_field)
         light_field.check_complete()
         chosen = How.of(how, options)
-        refuse(self, "one plan for all channels")
-        if chosen.between_views == "depth" and max(light_field.grid.shape[:2]) > 1:
-            light_field.grid.disparities.maps(progress)  # now, so that progress is reported
-        return compile_best(self, light_field.grid, chosen)
+        if not self.depends_on_bands:
+            return _plan_of(self, light_field, chosen, progress)
+        trains = self._trains_of(light_field.grid)
+        plans = [
+            _plan_of(
+                same.train,
+                SomeChannels.of(light_field, same.channels),
+                chosen,
+                part_of(progress, number, len(trains)),
+            )
+            for number, same in enumerate(trains)
+        ]
+        return BandPlans(trains, plans)
+
+    def _trains_of(self, grid: Grid) -> list[SameWay]:
+        """The trains that the bands of a light field take, after checks of the sensor's response."""
+        response_matrix(self.sensor, grid)
+        return trains_of(self, grid.channels, grid.wavelengths)
 
     def capture(
         self,
         light_field: Samples,
         how: How | None = None,
         *,
-        plan: Plan | None = None,
+        plan: Plan | BandPlans | None = None,
         executor: Any = None,
         progress: Progress | None = None,
         **options: Unpack[Options],
@@ -260,7 +290,7 @@ class Camera(Train):
         """The image that the sensor records of a light field.
 
         Elements that depend on the wavelength or the channel, and a sensor with a response, make an image of each
-        band, by one plan for all bands that meet equal elements; ``plan`` is then not accepted.
+        band, by one plan for all bands that meet equal elements.
 
         Args:
             light_field: at the entrance plane z = 0; in memory, or on disk (`vcc.store.open_store`). A light
@@ -311,11 +341,11 @@ class Camera(Train):
                 )
             return self._of_parts(light_field, chosen, executor, progress)
         if self.depends_on_bands:
-            _check_no_plan(plan)
-            return self._captured_by_bands(light_field, chosen, executor, progress)
+            return self._captured_by_bands(light_field, chosen, plan, options, executor, progress)
         cautions = Cautions(self, light_field.grid)
         _warn_of(cautions.before())
         plan = self._planned(light_field, chosen, plan, options, progress)
+        assert isinstance(plan, Plan)
         found = drive(plan, light_field, chosen, progress, executor)
         _warn_of(cautions.of(plan, light_field, found, chosen))
         return self._image(found)
@@ -340,13 +370,18 @@ class Camera(Train):
         return interleaved(tile, self) if alternate else PhotodiodeImage.of(tile, self)
 
     def _captured_by_bands(
-        self, light_field: Samples, how: How, executor: Any, progress: Progress | None
+        self,
+        light_field: Samples,
+        how: How,
+        plans: Plan | BandPlans | None,
+        options: Options,
+        executor: Any,
+        progress: Progress | None,
     ) -> Image:
         """The image where bands of light meet different elements, or the sensor mixes them."""
         grid = light_field.grid
-        trains = trains_of(self, grid.channels, grid.wavelengths)
-        if self.sensor.response is not None:
-            matrix_of(self.sensor.response, grid.channels or 1, grid.wavelengths)  # refused before the work begins
+        trains = self._trains_of(grid)
+        made = None if plans is None else self._fitting(plans, trains, grid, options).plans
         if executor is None and len(trains) > 1:
             light_field = read_once(light_field, how)
         parts, said = [], []
@@ -354,7 +389,7 @@ class Camera(Train):
             part = SomeChannels.of(light_field, same.channels)
             one = type(self)(same.train.elements, same.train.sensor, name=self.name)
             cautions, advance = Cautions(one, part.grid), part_of(progress, number, len(trains))
-            plan = one.compile(part, how, progress=advance)
+            plan = _plan_of(one, part, how, advance) if made is None else made[number]
             found = drive(plan, part, how, advance, executor)
             parts.append((same, found))
             found = as_share(found, share)
@@ -397,14 +432,15 @@ class Camera(Train):
         light_field: Samples,
         how: How | None = None,
         *,
-        plan: Plan | None = None,
+        plan: Plan | BandPlans | None = None,
         progress: Progress | None = None,
         **options: Unpack[Options],
-    ) -> Operator:
+    ) -> LinearMap:
         """The linear map from samples of a light field to the image, with its adjoint, for inverse problems.
 
         ``op(samples)`` returns the image of any samples on the light field's grid, ``op.T(picture)`` applies
-        the adjoint.
+        the adjoint. A camera that depends on the wavelength or the channel has one plan for each group of bands,
+        and the sensor's response is part of the map.
 
         Args:
             light_field: defines the grid; in memory, or on disk and then read in pieces.
@@ -422,19 +458,44 @@ class Camera(Train):
         """
         check_is_light_field(light_field)
         chosen = How.of(how, options)
-        return Operator(self._planned(light_field, chosen, plan, options, progress), light_field, chosen)
+        made = self._planned(light_field, chosen, plan, options, progress)
+        if isinstance(made, BandPlans):
+            return BandOperator.of(made, self.sensor, light_field, chosen)
+        return Operator(made, light_field, chosen)
 
     def _planned(
-        self, light_field: Samples, how: How, plan: Plan | None, options: Options, progress: Progress | None
-    ) -> Plan:
+        self,
+        light_field: Samples,
+        how: How,
+        plan: Plan | BandPlans | None,
+        options: Options,
+        progress: Progress | None,
+    ) -> Plan | BandPlans:
         """The given plan, if it fits, or a new one; warns of the plan's cautions."""
         if plan is None:
             plan = self.compile(light_field, how, progress=progress)
+        elif self.depends_on_bands:
+            plan = self._fitting(plan, self._trains_of(light_field.grid), light_field.grid, options)
+        elif isinstance(plan, BandPlans):
+            raise InputError("these plans are for another camera: make them anew with camera.compile(light_field)")
         else:
             plan.check_fits(self, light_field.grid)
             _check_of_the_run(options)
         _warn_of(plan.cautions)
         return plan
+
+    def _fitting(
+        self, plans: Plan | BandPlans, trains: Sequence[SameWay], grid: Grid, options: Options
+    ) -> BandPlans:
+        """Plans made before, if they fit this camera and a light field."""
+        if not isinstance(plans, BandPlans):
+            raise InputError(
+                "plan= is one plan, and this camera depends on the wavelength or the channel, so that it has one "
+                "for each group of bands: make them with camera.compile(light_field)"
+            )
+        plans.check_fits(trains, grid)
+        _check_of_the_run(options)
+        return plans
 
     def expose(
         self,
@@ -445,7 +506,7 @@ class Camera(Train):
         radiance: float = 1.0,
         ray_seed: int = 0,
         how: How | None = None,
-        plan: Plan | None = None,
+        plan: Plan | BandPlans | None = None,
         executor: Any = None,
         progress: Progress | None = None,
         **options: Any,
@@ -507,7 +568,7 @@ class Camera(Train):
     def _explained(self, light_field: Samples, how: How, executor: Any, progress: Progress | None) -> Explanation:
         if self.depends_on_bands:
             return self._explained_by_bands(light_field, how, executor, progress)
-        plan = self.compile(light_field, how, progress=progress)
+        plan = _plan_of(self, light_field, how, progress)
         return explained(self, light_field, plan, how, executor)
 
     def _explained_by_bands(
@@ -631,7 +692,7 @@ def each_captured(
         for number, one in found:
             camera = cameras[number]
             # The camera's own plan explains a dark image.
-            plan = mixture.plans[0] if one.values.any() else camera.compile(light_field, how)
+            plan = mixture.plans[0] if one.values.any() else _plan_of(camera, light_field, how)
             _warn_of(cautions.of(plan, light_field, one))
             yield number, camera._image(one)
     done = set() if mixture is None else set(mixture.members)

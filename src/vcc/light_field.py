@@ -13,6 +13,7 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.engines import on_gpu
+from vcc.fields.filling import Filling
 from vcc.fields.grid import ALL, Beyond, Sample, camera_array_frame
 from vcc.fields.sampled import to_numpy
 from vcc.fields.samples import InMemory, shape_of
@@ -52,6 +53,9 @@ class LightField(InMemory):
         beyond: for a piece, (before, after) along (v, u, t, s): the number of samples of the whole light
             field beyond the piece, in steps of the piece. Slicing sets it; none for a whole light field.
         wavelengths: see `with_wavelengths`.
+        filling: which views were not recorded but rendered from the others or left dark, with their estimated
+            errors, see `vcc.fields.filling.Filling`; None if all were recorded. ``given`` is its (rows, columns)
+            of recorded views.
 
     Raises:
         InputError: not 4-D or 5-D, an empty axis, a dtype that is not unsigned integer or floating point,
@@ -69,6 +73,7 @@ class LightField(InMemory):
         extent: tuple[float, float] | None = None,
         beyond: Beyond = ALL,
         wavelengths: Sequence[float] | None = None,
+        filling: Filling | None = None,
     ) -> None:
         if values is None or frame is None:
             raise InputError(
@@ -76,7 +81,8 @@ class LightField(InMemory):
                 "LightField.from_views(values, spacing, slope_per_pixel, focus_distance) makes it for views of "
                 "parallel cameras, and vcc.open_light_field reads files"
             )
-        super().__init__(values, frame, disparity_range, sample, disparity, extent, beyond, wavelengths)  # type: ignore[arg-type]
+        scene = (disparity_range, sample, disparity, extent, beyond, wavelengths)
+        super().__init__(values, frame, *scene, filling)  # type: ignore[arg-type]
 
     @classmethod
     def from_views(

@@ -61,13 +61,14 @@ class Served:
             {"lenslets": Document(LENSLETS, "scene")},
         )
         self.port = 0
+        self.door = Door(LOOPBACK, "a-token-of-tests")
 
     def start(self) -> None:
         """Listen, at the port of before if there was one."""
         self._socket = listening(LOOPBACK, self.port)
         self.port = self._socket.getsockname()[1]
         config = uvicorn.Config(
-            application(self.offered, Door(), static_files()),
+            application(self.offered, self.door, static_files()),
             log_level="critical",
             ws="websockets-sansio",
             timeout_graceful_shutdown=1,
@@ -93,7 +94,7 @@ class Served:
     @property
     def address(self) -> str:
         """Of its page."""
-        return f"http://{LOOPBACK}:{self.port}/"
+        return f"http://{LOOPBACK}:{self.port}/?token={self.door.token}"
 
 
 @contextlib.contextmanager

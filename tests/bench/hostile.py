@@ -23,7 +23,7 @@ import vcc
 from tests.bench.on_bench import CAMERA, START, Client, offered
 from vcc.bench import additions
 from vcc.bench.document import Document
-from vcc.bench.session import CHANGES, QUESTIONS
+from vcc.bench.inbox import CHANGES, QUESTIONS
 
 Json = Any
 LONG = 5.0
@@ -93,6 +93,7 @@ def cameras() -> list[Json]:
     elements = [
         additions.new_element(kind["kind"], z, described.train, set())
         for kind in additions.kinds()
+        if kind["addable"]
         for z in ("26 mm", "0 mm")
     ]
     found = [{**CAMERA, "elements": [*CAMERA["elements"], each]} for each in elements]  # type: ignore[misc]
@@ -171,7 +172,7 @@ ASKED = [
     "gallery",
     "name",
 ]
-ASKED += ["from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
+ASKED += ["number", "look", "ends", "from", "to", "frames", "format", "frames_per_second", "distance", "moving"]
 PATHS: list[Json] = [
     ["elements", 1, "pattern"],
     ["sensor", "z"],

@@ -1,6 +1,7 @@
 """The module of the bench's front end: small, self-contained, and what its sources make."""
 
 import re
+import runpy
 import shutil
 import subprocess
 from pathlib import Path
@@ -32,3 +33,9 @@ def test_module_is_what_its_sources_make(tmp_path):
     subprocess.run([node, "build.mjs", "--to", str(tmp_path / "bench.js")], cwd=FRONT, check=True, timeout=60)
     made = (tmp_path / "bench.js").read_bytes()
     assert made == BUNDLE.read_bytes(), "the sources have changed: run npm run build in bench/front"
+
+
+def test_messages_of_the_front_end_are_those_of_python():
+    made = runpy.run_path(str(ROOT / "tools" / "bench" / "protocol.py"))["protocol"]()
+    written = (FRONT / "src" / "protocol.ts").read_text(encoding="utf-8")
+    assert made == written, "vcc/bench/messages.py has changed: run tools/bench/protocol.py, and npm run build"

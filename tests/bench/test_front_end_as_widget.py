@@ -16,16 +16,19 @@ HOST = """async () => {
     name: "z", words: "", unit: "length", needed: true, default: null, takes: ["number"], choices: [],
   };
   const parts = {
-    is: "parts", light_fields: ["scene"], kinds: [kinds], sensor: [place], families: {}, gallery: [],
+    is: "parts", light_fields: ["scene"], kinds: [kinds], sensor: [place], families: {}, gallery: [], presets: [],
   };
   const state = (turn, z) => ({
-    is: "state", turn, undo: false, redo: false, grid: [3, 3, 8, 8, 3],
+    is: "state", turn, undo: false, redo: false, grid: [3, 3, 8, 8, 3], bands: null,
     document: {
       camera: {elements: [], sensor: {z: `${z} mm`, shape: [8, 8], pitch: "1 mm"}}, light_field: "scene",
-      views: null, exposure: null, noise: false,
+      views: null, aperture: {z: "0 mm", decentre: ["0 mm", "0 mm"]}, wavelengths: null,
+      exposure: null, noise: false,
     },
-    side: {from: -0.02, to: 0.06, half: 0.01, elements: [], rays: [], focus: null, snaps: [], words: [],
-      sensor: {z: z / 1000, half: 0.004, decentre: 0, label: ["sensor"]}},
+    side: {
+      axis: "x", start: -0.02, end: 0.06, half: 0.01, elements: [], rays: [], aperture: null, snaps: [], words: [],
+      sensor: {z: z / 1000, half: 0.004, decentre: 0, label: ["sensor"], handles: []},
+    },
   });
   const square = document.createElement("canvas");
   square.width = square.height = 8;
@@ -48,7 +51,11 @@ HOST = """async () => {
         if (message.do === "hello" || message.do === "set") {
           const z = message.do === "set" ? parseFloat(message.value) : 52;
           tell(state(message.turn, z), []);
-          const about = {coarse: false, shape: [8, 8], white: 1, missing: 0, took: 1, psnr: null};
+          const look = {black: 0, linear: false, channel: null, photodiodes: "sum", axis: "x"};
+          const about = {
+            coarse: false, moving: false, shape: [8, 8], white: 1, look, channels: 3, photodiodes: [1, 1],
+            missing: 0, by_rays: false, took: 1, psnr: null, same: false, histogram: null,
+          };
           tell({is: "picture", turn: message.turn, ...about}, [picture()]);
         }
       });

@@ -44,5 +44,5 @@ def test_it_is_the_gallery_s_own_camera_and_sees_the_scene(name, field):
     assert vcc.Camera(train.elements, train.sensor) == made
     assert published.without_samples().light_field.frame == field.whole().frame
     taken = take(train, field, document, COARSER[-1])
-    assert taken.found.missing_rays < 1e-3
+    assert taken.image.missing_rays < 1e-3
     assert taken.values.std() > 0.1 * taken.values.mean()

@@ -21,13 +21,16 @@ from hypothesis import strategies as some
 import vcc
 from tests.bench.hostile import ASKED
 from tests.bench.on_bench import CAMERA, NOWHERE, PIXELS, START, Client, noise, offered
+from vcc.bench import imaging as imaging_there
 from vcc.bench import offered as offered_there
 from vcc.bench import picture as picture_there
 from vcc.bench import session as session_there
+from vcc.bench.additions import FROM_FILES
 from vcc.bench.document import Document
+from vcc.bench.inbox import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.bench.offered import Field
-from vcc.bench.picture import COARSER, WHOLE, Pace, Taken, codes, take
-from vcc.bench.session import CHANGES, MOST_WAITING, QUESTIONS, Broken
+from vcc.bench.picture import COARSER, WHOLE, take
+from vcc.bench.screen import codes
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.files.pictures import auto_exposure
 from vcc.plan.choice import compile_best
@@ -51,7 +54,7 @@ def test_hello_brings_parts_state_and_picture(client):
     state, _ = client.until("state")
     assert state["document"] == json.loads(json.dumps(START.as_json()))
     message = client.at_rest()
-    assert (message["turn"], message["shape"]) == (7, [PIXELS, PIXELS])
+    assert (message["turn"], message["shape"]) == (7, (PIXELS, PIXELS))
     client.until("notes")
 
 
@@ -111,18 +114,24 @@ def test_a_picture_that_cannot_be_made_is_said(client):
     assert client.at_rest()["is"] == "picture"
 
 
-def test_noise_is_recorded_and_told(client):
+def test_noise_is_recorded_and_told_and_brings_electronics(client):
     client.do("hello")
-    client.do("set", where=["noise"], value=True)
-    assert "has none" in client.until("refused")[0]["words"]
-    client.do("set", where=["sensor", "electronics"], value={})
     client.do("set", where=["noise"], value=True, turn=5)
+    remark, _ = client.until("refused")
+    assert remark["done"]
+    assert "electronics" in remark["words"]
     while client.at_rest()["turn"] != 5:
         pass
     client.do("value", x=0, y=0)
     recorded = client.until("value")[0]["recorded"]
     assert len(recorded) == 3
     assert all(isinstance(number, int) and number >= 0 for number in recorded)
+    client.do("set", where=["sensor", "electronics"], value=None)
+    assert client.until("state")[0]["document"]["noise"] is False
+    client.do("undo")
+    client.do("undo")
+    client.until("state")
+    assert client.until("state")[0]["document"] == json.loads(json.dumps(START.as_json()))  # each was one step
 
 
 def test_elements_are_added_copied_and_removed(client):
@@ -140,7 +149,12 @@ def test_elements_are_added_copied_and_removed(client):
     assert "there is no element 5" in client.until("refused")[0]["words"]
 
 
-@pytest.mark.parametrize("kind", list(ELEMENT_KINDS))
+def test_kind_that_comes_from_a_file_is_not_added_and_the_way_out_is_named(client):
+    client.do("add", kind="real_lens", z="13 mm")
+    assert "comes from a lens file" in client.until("refused")[0]["words"]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in ELEMENT_KINDS if kind not in FROM_FILES])
 def test_each_kind_can_be_added_and_drawn(client, kind):
     client.do("add", kind=kind, z="13 mm")
     state, _ = client.until("state", "refused")
@@ -153,8 +167,8 @@ def test_each_kind_can_be_added_and_drawn(client, kind):
 def test_pictures_are_compared_with_the_pinned_one(client):
     client.do("hello")
     client.until("notes")
-    client.do("pin", on=True)
-    _, (pinned,) = client.until("pinned")
+    client.do("pin")
+    _, (_, pinned) = client.until("pins")
     assert imagecodecs.jpeg_decode(pinned).shape == (PIXELS, PIXELS, 3)
     client.do("set", where=["sensor", "z"], value="54 mm")
     changed = client.at_rest()
@@ -250,8 +264,10 @@ def test_cameras_come_from_text_and_from_the_gallery():
     assert client.session.document.camera["sensor"]["z"] == "30 mm"
     client.do("load", toml="[sensor")
     assert "not valid TOML" in client.until("refused")[0]["words"]
+    assert client.until("state")[0]["document"]["camera"]["sensor"]["z"] == "30 mm"  # what is so is said again
     client.do("load", toml='[sensor]\nz = 1979-05-27\nshape = [4, 4]\npitch = "1 mm"\n')
     assert client.until("refused", "state")[0]["is"] == "refused"
+    client.until("state")
     client.do("load", gallery="other")
     client.until("state")
     assert client.session.document.camera["sensor"]["z"] == "55 mm"
@@ -367,68 +383,24 @@ def test_the_camera_file_gives_the_same_camera(client, tmp_path):
 # --- pictures ---
 
 
-def test_the_pace_is_kept_for_each_kind_of_camera():
-    pace, taken = Pace(), take(START.train(NOWHERE).train, Field(noise()), START)
-    assert pace.fineness("new") == COARSER[0]
-    pace.noted("quick", WHOLE, timed(taken, 0.01))
-    assert pace.fineness("quick") == WHOLE
-    pace.noted("slow", WHOLE, timed(taken, 0.07))
-    assert pace.fineness("slow") == COARSER[0]
-    pace.noted("slower", WHOLE, timed(taken, 100.0))
-    assert pace.fineness("slower") == COARSER[-1]
-    for _ in range(1000):  # 0.99¹⁰⁰⁰ · 100 s = 4 ms
-        pace.noted("slower", COARSER[-1], timed(taken, 1e-4))
-    assert pace.fineness("slower") == WHOLE
-    # four times the pixels are four times the run, but one plan: 12 + 4·4 ms are too long, 12 + 16·0.4 ms are not
-    for run, finest in ((0.004, COARSER[-1]), (0.0004, COARSER[0])):
-        pace.noted(run, COARSER[-1], timed(taken, 0.012 + run, planning=0.012))
-        assert pace.fineness(run) == finest
-
-
-def test_a_first_picture_for_which_kernels_were_compiled_does_not_keep_those_after_it_coarse():
-    pace, taken = Pace(), take(START.train(NOWHERE).train, Field(noise()), START)
-    pace.noted("lens", COARSER[0], timed(taken, 5.0))
-    assert pace.fineness("lens") == COARSER[-1]
-    pace.noted("lens", WHOLE, timed(taken, 0.05))
-    assert pace.fineness("lens").pixels == 2
-    assert pace.seconds("lens") == 0.05
-    # what turns out too slow, although its share of the whole is quick enough, is left for a while
-    for _ in range(5):
-        pace.noted("lens", COARSER[0], timed(taken, 0.05))
-        pace.noted("lens", COARSER[1], timed(taken, 0.05))
-    assert pace.fineness("lens") == COARSER[2]
-
-
-def test_a_picture_that_the_machine_was_too_busy_for_is_soon_tried_again():
-    pace, taken = Pace(), take(START.train(NOWHERE).train, Field(noise()), START)
-    for _ in range(5):
-        pace.noted("lens", WHOLE, timed(taken, 0.01))
-    pace.noted("lens", WHOLE, timed(taken, 0.05))  # 0.8·10 + 0.2·50 = 18 ms
-    assert pace.fineness("lens") == WHOLE
-    pace.noted("lens", WHOLE, timed(taken, 0.05))
-    assert pace.fineness("lens") == COARSER[0]
-    pace.noted("lens", WHOLE, timed(taken, 0.01))  # as at rest: 0.4·24 + 0.6·10 ms
-    assert pace.fineness("lens") == WHOLE
-
-
 def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch):
     made = []
 
-    def noted(train, field, document, fineness=WHOLE, progress=None):
+    def noted(train, field, document, fineness, progress, kept):
         made.append((fineness, train.sensor.z))
-        return take(train, field, document, fineness, progress)
+        return take(train, field, document, fineness, progress, kept)
 
-    monkeypatch.setattr(session_there, "take", noted)
-    monkeypatch.setattr(session_there, "SLOW", np.inf)
+    monkeypatch.setattr(imaging_there, "take", noted)
+    monkeypatch.setattr(imaging_there, "SLOW", np.inf)
     monkeypatch.setattr(session_there, "LINGER", 0.01)
     client = Client()
     client.do("hello", turn=1)
     client.at_rest()
     client.until("notes")
     assert client.session.join(30)
-    levels = [WHOLE, *COARSER]
+    levels = [WHOLE, *(each for each in COARSER if each.rays != 4 or each.pixels != 2)]  # a plan has no rays
     away = 0.052 * 13 / 12
-    assert made[-10:] == [(each, pytest.approx(z)) for z in (away, 0.052) for each in levels]
+    assert made[-2 * len(levels) :] == [(each, pytest.approx(z)) for z in (away, 0.052) for each in levels]
     assert not client.told
     # with its mask elsewhere it is the same kind of camera
     del made[:]
@@ -442,12 +414,33 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     client.do("set", where=["elements", 1], value=lenslets, turn=3)
     client.at_rest()
     assert client.session.join(30)
-    assert made == [(each, pytest.approx(0.052)) for each in levels]
+    assert made == [(each, pytest.approx(0.052)) for each in (WHOLE, *COARSER)]
     client.close()
 
 
-def timed(taken, seconds, planning=0.0):
-    return Taken(taken.image, None, taken.plan, taken.found, False, seconds, planning)
+def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_without_work(monkeypatch):
+    made = []
+
+    def coarse_while_moving(train, field, document, fineness, progress, kept):
+        made.append(fineness)
+        return take(train, field, document, fineness, progress, kept)
+
+    monkeypatch.setattr(imaging_there.Pace, "fineness", lambda pace, of: COARSER[0])
+    client = Client()
+    client.do("hello")
+    client.at_rest()
+    assert client.session.join(30)
+    monkeypatch.setattr(imaging_there, "take", coarse_while_moving)
+    client.do("set", where=["sensor", "z"], value="53 mm", moving=True, turn=1)
+    coarse, _ = client.until("picture")
+    client.do("set", where=["sensor", "z"], value="53 mm", moving=True, rests=True, turn=2)
+    whole, _ = client.until("picture")
+    assert [(each["turn"], each["coarse"]) for each in (coarse, whole)] == [(1, True), (2, False)]
+    client.do("set", where=["sensor", "z"], value="53 mm", turn=3)
+    assert client.at_rest()["turn"] == 3
+    assert made[:2] == [COARSER[0], WHOLE]
+    assert WHOLE not in made[2:]  # of what is the same again none is made
+    client.close()
 
 
 @pytest.mark.parametrize("fineness", COARSER)
@@ -502,6 +495,114 @@ def test_a_plan_is_given_up_where_its_picture_is_no_longer_wanted(monkeypatch):
     monkeypatch.setattr(picture_there, "drive", None)  # is never reached
     with pytest.raises(session_there.Superseded):
         take(START.train(NOWHERE).train, Field(noise()), START, WHOLE, progress)
+
+
+# --- photodiodes and bands ---
+
+
+def test_photodiodes_are_shown_side_by_side_as_capture_makes_them(client):
+    client.do("hello")
+    client.at_rest()
+    client.do("look", look={"photodiodes": "apart"})
+    client.do("set", where=["sensor", "photodiodes"], value=[1, 2], turn=2)
+    while True:
+        message, (data,) = client.until("picture", "no picture")
+        if message["turn"] == 2 and not message["coarse"]:
+            break
+    assert (message["shape"], message["photodiodes"]) == ((PIXELS, 2 * PIXELS), (1, 2))
+    assert imagecodecs.jpeg_decode(data).shape[:2] == (PIXELS, 2 * PIXELS)
+    image = camera_of(client.session.document).capture(noise())
+    (row,) = image.upright().photodiodes
+    for column, photodiode in enumerate(row):  # in their order as people see the image
+        client.do("value", x=column * PIXELS + 7, y=9)
+        told = client.until("value")[0]["irradiance"]
+        assert told == pytest.approx(photodiode.values[9, 7].tolist(), rel=1e-5)
+    client.do("look", look={})
+    assert client.until("picture")[0]["shape"] == (PIXELS, PIXELS)
+    client.do("value", x=7, y=9)
+    told = client.until("value")[0]["irradiance"]
+    assert told == pytest.approx(image.upright().values[9, 7].tolist(), rel=1e-5)
+
+
+def test_glass_gets_wavelengths_by_itself_and_each_band_its_own_picture(client):
+    client.do("hello")
+    client.at_rest()
+    glass = {"kind": "lens", "glass": "N-BK7", "focal_length": "50 mm", "diameter": "18 mm", "z": "0 mm"}
+    client.do("set", where=["elements", 0], value=glass, turn=2)
+    state, _ = client.until("state", "refused")
+    assert state["document"]["wavelengths"] == ["610 nm", "540 nm", "465 nm"]
+    assert state["bands"] == pytest.approx([610e-9, 540e-9, 465e-9])
+    message = client.at_rest()
+    assert (message["is"], message["turn"]) == ("picture", 2), message
+    field = noise().with_wavelengths([610e-9, 540e-9, 465e-9])
+    expected = camera_of(client.session.document).capture(field).upright().to_numpy()[4, 3]
+    client.do("value", x=3, y=4)
+    assert client.until("value")[0]["irradiance"] == pytest.approx(expected.tolist(), rel=1e-6)
+    client.do("ask", what="explain")
+    assert "610 nm" in client.until("answer")[0]["words"]
+    client.do("ask", what="mtf")
+    assert "for the design wavelength" in client.until("answer")[0]["remark"]
+    client.do("set", where=["wavelengths"], value=["610 nm"], turn=3)
+    assert "wavelengths" in client.until("refused")[0]["words"]
+
+
+@pytest.mark.parametrize("name", ["glass", "photodiodes"])
+def test_program_of_bands_and_photodiodes_makes_the_identical_picture(name, tmp_path, monkeypatch):
+    changes = {
+        "glass": {"where": ["elements", 0, "glass"], "value": "N-BK7"},
+        "photodiodes": {"where": ["sensor", "photodiodes"], "value": [1, 2]},
+    }
+    client = Client()
+    client.do("hello")
+    client.at_rest()
+    client.do("set", **changes[name])
+    client.at_rest()
+    stated, program = exported(client, "python")
+    _, picture = exported(client, "png")
+    client.close()
+    assert stated == "picture.py"
+    (tmp_path / "picture.py").write_bytes(program)
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+        runpy.run_path("picture.py")
+    assert (tmp_path / "picture.png").read_bytes() == picture
+
+
+def test_a_profile_is_that_of_the_image_and_as_long_as_on_the_sensor(client):
+    client.do("hello")
+    client.at_rest()
+    values = camera_of(START).capture(noise()).upright().to_numpy()
+    client.do("ask", what="profile", ends=[3, 5, 13, 5])
+    told, _ = client.until("answer")
+    assert pytest.approx(values[5, 3:14], rel=1e-5) == np.array(told["values"]).T
+    assert told["places"] == pytest.approx(np.arange(11) * 1e-3)  # pixels of 1 mm
+    client.do("ask", what="profile", ends=[2, 2, 6, 6])
+    diagonal, _ = client.until("answer")
+    assert diagonal["places"][-1] == pytest.approx(4e-3 * 2**0.5)
+    client.do("ask", what="profile", ends=[2, 2, 2, 2])
+    assert "one pixel" in client.until("refused")[0]["words"]
+
+
+def test_a_look_shows_a_channel_with_other_levels_and_leaves_the_numbers(client):
+    client.do("hello")
+    message = client.at_rest()
+    histogram = message["histogram"]
+    values = camera_of(START).capture(noise()).to_numpy()
+    assert [sum(counts) for counts in histogram["counts"]] == [PIXELS**2] * 3
+    assert histogram["above"] == pytest.approx(np.mean(values > message["white"]))
+    client.until("notes")
+    client.do("look", look={"black": 0.25, "linear": True, "channel": 1}, turn=4)
+    message, (data,) = client.until("picture")
+    shown = imagecodecs.jpeg_decode(data).astype(float)
+    black, white = 0.25 * message["white"], message["white"]
+    exact = 255 * np.clip((values[::-1, ::-1, 1] - black) / (white - black), 0, 1)
+    assert shown.ndim == 2
+    assert np.abs(shown - exact).max() < 8  # JPEG at its best quality
+    assert message["histogram"]["below"] == pytest.approx(np.mean(values <= black), abs=1e-6)
+    for look in ({"black": 1}, {"channel": -1}, {"linear": 1}, {"photodiodes": "all"}, {"axis": "z"}, 5, {"x": 1}):
+        client.do("look", look=look)
+        assert len(client.until("refused")[0]["words"]) > 20
 
 
 # --- sequences ---
@@ -588,11 +689,39 @@ def test_a_picture_is_brought_as_a_pattern(client):
     assert table["pattern"] == [[0.0, 0.2, 1.0], [1.0, 0.4, 0.0]]
 
 
+def npy(values):
+    """The bytes of an array's file."""
+    stored = io.BytesIO()
+    np.save(stored, values)
+    return stored.getvalue()
+
+
+def test_a_photograph_as_pattern_is_reduced_by_means_in_linear_light_and_that_is_said(client):
+    client.do("hello")
+    client.until("state")
+    random = np.random.default_rng(3)
+    shown = random.uniform(0, 1, (600, 800)).astype(np.float32)
+    data = npy(shown)
+    assert len(data) > 2**20
+    where = ["elements", 1, "pattern"]
+    client.session.receive({"do": "upload", "where": where, "name": "leaf.npy", "turn": 3}, [data])
+    cells = np.array(client.until("state")[0]["document"]["camera"]["elements"][1]["pattern"])
+    remark, _ = client.until("refused")
+    assert remark["done"]
+    assert "from 600×800 to 110×147 cells" in remark["words"]
+    assert cells.shape == (110, 147)
+    assert cells.size <= 2**14
+    # each cell is the mean over its area: by repeating each pixel until cells are whole numbers of them
+    fine = np.repeat(np.repeat(shown[:, :16].astype(np.float64), 11, axis=0), 147, axis=1)
+    wanted = fine.reshape(110, 60, -1)[:, :, :800].mean(axis=(1, 2))
+    assert cells[:, 0] == pytest.approx(wanted, abs=6e-5)  # four digits are kept
+
+
 @pytest.mark.parametrize(
     ("name", "data", "words"),
     [
         ("a.png", b"no picture", "a.png"),
-        ("a.png", imagecodecs.png_encode(np.zeros((129, 128), np.uint8)), "129×128"),
+        ("a.npy", npy(np.ones((2, 3, 4, 5))), "2×3×4×5"),
         ("../a.toml", b"", "a.toml"),
         (None, b"", "a file name and one buffer"),
     ],
@@ -668,7 +797,7 @@ def test_a_film_as_mp4_tells_how_far_it_is_and_leaves_no_file(client, shape, tmp
             camera_of(client.session.document.changed(["sensor", "z"], z)).capture(noise()).to_numpy()
             for z in ("50 mm", "54 mm")
         ]
-    white = client.session._shown_white
+    white = client.session._white
     for frame, each in zip((frames[0], frames[-1]), values, strict=True):
         # H.264 at this quality, with a colour for four pixels: means within some codes
         assert frame[: shape[0], : shape[1]].mean() == pytest.approx(codes(each, white).mean(), abs=4)
@@ -721,7 +850,8 @@ def test_films_that_cannot_be_made_are_refused(client, changes, words):
 def test_what_takes_long_is_broken_off_by_a_change(client, asked):
     client.do("hello")
     client.at_rest()
-    client.session._taken = dataclasses.replace(client.session._taken, coarse=True)  # a whole one is to be made
+    imaging = client.session._imaging
+    imaging.taken = dataclasses.replace(imaging.taken, coarse=True)  # a whole one is to be made
     with client.session.offered.turn.held():
         client.do("export", **asked)
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)
@@ -762,15 +892,15 @@ def test_a_small_picture_does_not_wait_for_all_of_a_large_one(monkeypatch):
     for each in (large, small):
         each.do("hello")
         each.at_rest()
-    done, made = threading.Event(), session_there.take
+    done, made = threading.Event(), imaging_there.take
 
-    def slow(train, field, document, fineness, progress):
+    def slow(train, field, document, fineness, progress, kept):
         if document.exposure == 0.5:  # the large one: as long as the small one is not there
             while not done.wait(0.001):
                 progress(0, 1)
-        return made(train, field, document, fineness, progress)
+        return made(train, field, document, fineness, progress, kept)
 
-    monkeypatch.setattr(session_there, "take", slow)
+    monkeypatch.setattr(imaging_there, "take", slow)
     large.do("set", where=["exposure"], value=0.5, turn=2)
     while not there.turn._order:
         time.sleep(0.001)

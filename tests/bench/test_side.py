@@ -16,7 +16,7 @@ from vcc.units import mm
 def drawn(document=START, light_field=None):
     described = document.train(NOWHERE)
     grid = None if light_field is None else light_field.grid
-    return side(described.elements, described.train, light_field, grid)
+    return side(described, light_field, grid)
 
 
 def with_element(**table):
@@ -26,9 +26,19 @@ def with_element(**table):
 def test_rays_land_where_similar_triangles_put_them():
     found = drawn()
     focus = 1 / (1 / 0.05 - 1 / 0.052)
-    assert found["focus"] == pytest.approx(focus)
-    by_role = {rays["colour"]: rays for rays in found["rays"]}
-    assert set(by_role) == {"focused", "near", "off axis"}
+    by_role = {rays["role"]: rays for rays in found["rays"]}
+    assert list(by_role) == ["off axis", "near", "focused"]  # the one in focus is drawn on top
+    assert by_role["focused"]["distance"] == pytest.approx(focus)
+    # by Newton the image of a point at Z is 1/(1/f − 1/Z) behind the lens; the near one's is far behind the sensor
+    assert {role: rays["meet"] and rays["meet"][0] for role, rays in by_role.items()} == {
+        "off axis": pytest.approx(0.052, rel=1e-4),
+        "near": None,
+        "focused": pytest.approx(0.052, rel=1e-4),
+    }
+    field = noise()
+    for rays in drawn(START, field)["rays"]:
+        if rays["meet"] is not None and rays["distance"] is not None:
+            assert rays["meet"][0] == pytest.approx(1 / (1 / 0.05 - 1 / rays["distance"]), rel=1e-4)
     assert all(abs(path[-1][1]) < 1e-7 for path in by_role["focused"]["paths"])
     near = by_role["near"]
     for path in near["paths"]:
@@ -43,7 +53,7 @@ def test_the_scene_says_which_distances_matter():
     field = noise()
     found = drawn(START, field)
     nearest, farthest = (field.distance_of(disparity) for disparity in (1.0, -1.0))
-    by_role = {rays["colour"]: rays["distance"] for rays in found["rays"]}
+    by_role = {rays["role"]: rays["distance"] for rays in found["rays"]}
     assert by_role["near"] == pytest.approx(nearest)
     assert by_role["far"] == (pytest.approx(farthest) if 0 < farthest < math.inf else None)
     sharp = 1 / (1 / 0.05 - 1 / nearest)
@@ -97,6 +107,37 @@ def test_a_fine_mask_has_few_pieces_and_lets_as_much_through():
     pieces = np.array(drawn(fine)["elements"][1]["shades"])
     assert len(pieces) <= MOST_PIECES
     assert np.average(pieces[:, 2], weights=pieces[:, 1] - pieces[:, 0]) == pytest.approx(0.5, abs=0.02)
+
+
+def test_fans_fill_what_the_lens_and_the_views_pass():
+    wide, narrow = noise(), noise().scaled(0.3)  # views of 20 mm and of 6 mm before a lens of 18 mm
+    for field, half in ((wide, 9 * mm), (narrow, 3 * mm)):
+        described = with_element(kind="prism", deflection=[0, 0]).train(NOWHERE)
+        for rays in side(described, field, field.grid)["rays"]:
+            heights = [next(y for z, y, _ in path if z == 0) for path in rays["paths"]]
+            assert 0.95 * half < max(map(abs, heights)) <= half
+            assert all(path[-1][0] == 0.052 for path in rays["paths"])  # none is stopped
+
+
+def test_handles_change_what_they_stand_on():
+    table = {"kind": "lens_array", "pitch": "1 mm", "focal_length": "3 mm", "rotation": "5 deg", "width": "8 mm"}
+    found = drawn(with_element(**table, decentre=["1 mm", "2 mm"]))
+    handles = {each["words"]: each for each in found["elements"][1]["handles"]}
+    assert set(handles) == {"decentre", "width", "focal length", "rotation"}
+    assert handles["width"]["height"] == pytest.approx(5 * mm)  # the upper edge; both edges move
+    assert (handles["width"]["value"], handles["width"]["rate"]) == (8 * mm, 2.0)
+    assert (handles["focal length"]["z"], handles["focal length"]["along"]) == (3 * mm, "z")
+    assert (handles["decentre"]["value"], handles["decentre"]["other"]) == (1 * mm, 2 * mm)
+    assert handles["rotation"]["value"] == pytest.approx(math.radians(5))
+    pitch = found["sensor"]["handles"][1]
+    assert pitch["height"] == pytest.approx(24 / 2 * mm)
+    assert pitch["rate"] * 24 / 2 == pytest.approx(1)  # the edge follows the hand
+    above = side(with_element(**table, decentre=["1 mm", "2 mm"]).train(NOWHERE), None, None, axis=1)
+    handles = {each["words"]: each for each in above["elements"][1]["handles"]}
+    assert handles["decentre"]["value"] == 2 * mm
+    circle = {"kind": "mask", "pattern": {"name": "circle", "diameter": "6 mm"}}
+    (_, size) = drawn(with_element(**circle))["elements"][1]["handles"]
+    assert (size["where"], size["value"]) == (["pattern", "diameter"], 6 * mm)
 
 
 def test_it_is_json_whatever_is_infinite():

@@ -307,6 +307,16 @@ def test_stanford_names_give_relative_spacing(views: Views, folder_of: Write) ->
     assert field.frame.linear[1, 1] == pytest.approx(15.5e-3)
 
 
+def test_stanford_positions_off_an_even_grid(views: Views, folder_of: Write) -> None:
+    """Cameras of every second column are 2 further down: 2·√¼ = 1 root mean square about their mean, of 15.5."""
+    name = lambda j, i: f"out_{j:02d}_{i:02d}_{15.5 * j + 2 * (i % 2):f}_{12.25 * i:f}_.png"  # noqa: E731
+    folder = folder_of(views, name)
+    assert read_geometry(folder).off_grid == pytest.approx((1 / 15.5, 0))
+    with pytest.warns(ResultWarning) as said:
+        open_light_field(folder)
+    assert any("6% of a step off an even grid" in str(each.message) for each in said)
+
+
 def test_stanford_positions_tell_which_axis_is_flipped(views: Views, folder_of: Write) -> None:
     folder = folder_of(views[:, ::-1], stanford_name(right=-1))
     assert read_geometry(folder).directions == (1, -1)

@@ -34,6 +34,8 @@ TEXTS = {
     ".ply",
 }
 """Endings of files of text."""
+COUNTLESS = {".splat"}
+"""Endings of files that do not state their length: a cut between two entries cannot be noticed."""
 
 NUMBERS = ["0", "-1", "1", "nan", "inf", "-inf", "1e999", "-1e308", "1e-320", "2147483648", "-2147483649", "1e9"]
 NUMBERS += ["99999999999999999999", "9" * 5000, "0.5", "", "0x10", "1_0", "٣", "1e9999999", "true", "null", "[]"]
@@ -257,7 +259,7 @@ def in_folder(folder: Path, checked: bool, rng: Random) -> tuple[str, bool]:
     if way < 0.10:
         cut = rng.randrange(len(data)) if rng.random() < 0.7 else max(0, len(data) - rng.choice([1, 2, 4, 16, 64]))
         file.write_bytes(data[:cut])
-        return f"{name}: cut to {cut} of {len(data)}", not is_text
+        return f"{name}: cut to {cut} of {len(data)}", not is_text and file.suffix not in COUNTLESS
     if way < 0.20 and not is_text and data:
         place = rng.randrange(len(data))
         file.write_bytes(data[:place] + bytes([data[place] ^ 1 << rng.randrange(8)]) + data[place + 1 :])

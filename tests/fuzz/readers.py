@@ -13,12 +13,14 @@ import vcc
 from vcc.cli.decode_lenslets import _listed
 from vcc.cli.info import describe
 from vcc.files.pictures import read_grey
-from vcc.formats import read_ground_truth, read_lytro
+from vcc.formats import open_unstructured, read_ground_truth, read_lytro
+from vcc.formats.poses import read_poses
 from vcc.motion import load_moving_camera
 from vcc.prescriptions import read_prescription
 from vcc.sources.meshes import loaded
 from vcc.sources.mitsuba.renderer import _contents
 from vcc.sources.pbrt import PbrtScene
+from vcc.sources.splats import read_splats
 from vcc.store import open_store, open_video
 from vcc.sweeps import open_sweep
 
@@ -56,6 +58,16 @@ def sweep(path: Path) -> Read:
     swept = open_sweep(path)
     pictures = [swept[place].values for place in np.ndindex(*swept.shape) if swept.done[place]]
     return _read(swept.table, *pictures)
+
+
+def poses(path: Path) -> Read:
+    """Photographs with poses, and the plane of their cameras."""
+    views = open_unstructured(path)
+    shots = views.photographs.photographs
+    facts = views.facts()
+    finite = all(np.isfinite(shot.centre).all() and np.isfinite(shot.rotation).all() for shot in shots)
+    said = [(shot.lens.model, shot.lens.width, sorted(shot.lens.parameters.items())) for shot in shots]
+    return _read(facts, said, *(shot.centre for shot in shots), sane=finite)
 
 
 def lytro(path: Path) -> Read:
@@ -108,6 +120,16 @@ def mitsuba(path: Path) -> Read:
 
 def mesh(path: Path) -> Read:
     return _read(loaded(path)[0])
+
+
+def splats(path: Path) -> Read:
+    cloud = read_splats(path)
+    values = [cloud.positions, cloud.sizes, cloud.rotations, cloud.opacities, cloud.harmonics]
+    return _read(*values, sane=all(bool(np.isfinite(each).all()) for each in values))
+
+
+def scene_cameras(path: Path) -> Read:
+    return _read(read_poses(path))
 
 
 def info(path: Path) -> Read:

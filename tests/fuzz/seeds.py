@@ -21,6 +21,9 @@ from scipy.io import savemat
 
 import vcc
 from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, MOVING, PBRT_SCENE
+from tests.sources.splat_bytes import gltf, packed_ply, spz
+from tests.sources.splat_clouds import cloud
+from vcc.sources.splats import write_ply
 from vcc.store import Lossy, create_video, save_store
 
 Maker = Callable[[Path], Any]
@@ -103,6 +106,40 @@ def cambridge(folder: Path) -> None:
     grid(folder, "{r:02d}_{c:02d}", ".png")
     (folder / "param.txt").write_text("num_x: 3\nnum_y: 3\nbase_x: 0.1\nbase_y: 0.1\n")
     np.save(folder / "disparity.npy", np.linspace(0, 1, 24 * 32, dtype=np.float32).reshape(24, 32))
+
+
+def colmap(ending: str) -> Maker:
+    """A row of five photographs before a wall of points."""
+
+    def make(folder: Path) -> None:
+        (folder / "images").mkdir()
+        grid(folder / "images", "v{n}", ".png", size=(1, 5))
+        if ending == ".txt":
+            (folder / "cameras.txt").write_text("# cameras\n1 OPENCV 32 24 40 40 16 12 -0.1 0.01 0 0\n")
+            lines = [f"{n + 1} 1 0 0 0 {-0.1 * n} 0 0 1 v{n}.png\n1.5 2.5 -1\n" for n in range(5)]
+            (folder / "images.txt").write_text("".join(lines))
+            (folder / "points3D.txt").write_text("1 0 0 2 9 9 9 0.5 1 1\n2 0.1 0 3 9 9 9 0.5 1 1\n")
+            return
+        lens = struct.pack("<QIiQQ8d", 1, 1, 4, 32, 24, 40, 40, 16, 12, -0.1, 0.01, 0, 0)
+        (folder / "cameras.bin").write_bytes(lens)
+        data = struct.pack("<Q", 5)
+        for n in range(5):
+            data += struct.pack("<I7dI", n + 1, 1, 0, 0, 0, -0.1 * n, 0, 0, 1) + f"v{n}.png\0".encode()
+            data += struct.pack("<QddQ", 1, 1.5, 2.5, 2**64 - 1)
+        (folder / "images.bin").write_bytes(data)
+        data = struct.pack("<Q", 2)
+        for n in range(2):
+            data += struct.pack("<Q3d3BdQII", n, 0.1 * n, 0, 2 + n, 9, 9, 9, 0.5, 1, 1, 1)
+        (folder / "points3D.bin").write_bytes(data)
+
+    return make
+
+
+def transforms(folder: Path) -> None:
+    grid(folder, "v{n}", ".png", size=(1, 5))
+    matrices = [[[1, 0, 0, 0.1 * n], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]] for n in range(5)]
+    frames = [{"file_path": f"v{n}", "transform_matrix": matrix} for n, matrix in enumerate(matrices)]
+    (folder / "transforms.json").write_text(json.dumps({"camera_angle_x": 0.7, "k1": -0.1, "frames": frames}))
 
 
 def views_csv(folder: Path) -> None:
@@ -345,3 +382,29 @@ def mesh(folder: Path) -> None:
     )
     (folder / "a.mtl").write_text("newmtl m\nKd 1 1 1\nmap_Kd t.png\n")
     picture(folder / "t.png", scene()[0, 0])
+
+
+def splats(name: str, version: int = 3) -> Maker:
+    """Gaussian splats, by the ending of the file."""
+
+    def make(folder: Path) -> None:
+        if name == "packed.ply":
+            (folder / name).write_bytes(packed_ply())
+        elif name.endswith(".ply"):
+            write_ply(cloud(20, degree=1), folder / name)
+        elif name.endswith(".glb"):
+            gltf(folder, name)
+        elif name.endswith(".spz"):
+            (folder / name).write_bytes(spz(version))
+        else:
+            (folder / name).write_bytes(
+                struct.pack("<6f4B4B", 1, 2, 3, 0.1, 0.2, 0.3, 255, 0, 51, 204, 255, 0, 0, 0) * 5
+            )
+
+    return make
+
+
+POSES = """{"w": 800, "h": 600, "fl_x": 400.5, "frames": [{"file_path": "images/a.jpg", "transform_matrix":
+[[0.0, 0.0, -1.0, 1.5], [0.0, 1.0, 0.0, 2.5], [1.0, 0.0, 0.0, 3.5], [0.0, 0.0, 0.0, 1.0]]}]}"""
+CAMERAS = """[{"id": 0, "img_name": "a", "width": 800, "height": 600, "fx": 400.5, "fy": 400.5, "position":
+[1.5, 2, 3], "rotation": [[0, 0, 1], [0, -1, 0], [1, 0, 0]]}]"""

@@ -15,7 +15,7 @@ possible.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -160,10 +160,10 @@ def drawn(kind: str, seed: int, pixels: int = 32, views: int = 17) -> Case:
         pixels: approximate number per side.
         views: likewise.
     """
-    return _Drawing(kind, seed, pixels, views).case()
+    return Drawing(kind, seed, pixels, views).case()
 
 
-class _Drawing:
+class Drawing:
     def __init__(self, kind: str, seed: int, pixels: int, views: int) -> None:
         self.kind, self.seed, self.pixels, self.views = kind, seed, pixels, views
         self.rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
@@ -196,7 +196,7 @@ class _Drawing:
         elements = [*self.optics, *self._extras()]
         self.rng.shuffle(elements)  # type: ignore[arg-type]
         camera = vcc.Camera(elements, self.sensor)
-        frame, shape = self._cover(camera)
+        frame, shape = self._cover([camera])
         disparities = sorted(disparity_along(frame, w / (1 + w * self.flown), 0) for w in self.depths)
         return Case(
             kind=self.kind,
@@ -371,8 +371,8 @@ class _Drawing:
         veil = plane(near, 6 * FINEST)
         return Scene(plane(far, 1.2 * FINEST), plane(near, 1.2 * FINEST), veil.waves[0][1:])
 
-    def _cover(self, camera: vcc.Camera) -> tuple[Array, tuple[int, int, int, int]]:
-        """The frame at z = 0 and the shape of a light field that holds all rays the camera asks for."""
+    def _cover(self, cameras: Sequence[vcc.Camera]) -> tuple[Array, tuple[int, int, int, int]]:
+        """The frame at z = 0 and the shape of a light field that holds all rays the cameras ask for."""
         frame = np.eye(5)
         frame[:2, :2] = self.grid @ np.diag(self.spacing)
         frame[:2, 4] = -frame[:2, :2] @ (np.array(self.number) - 1) / 2
@@ -381,9 +381,10 @@ class _Drawing:
         flight = np.eye(5)
         flight[0, 2] = flight[1, 3] = self.flown
         frame = flight @ frame
-        low, high, _ = Bench(camera, frame, (self.number[1], self.number[0]), self.flown).asked(frame)
-        first = np.floor(low) - MARGIN
-        count = (np.ceil(high) + MARGIN - first + 1).astype(int)
+        views = (self.number[1], self.number[0])
+        asked = [Bench(camera, frame, views, self.flown).asked(frame) for camera in cameras]
+        first = np.floor(np.min([low for low, _, _ in asked], axis=0)) - MARGIN
+        count = (np.ceil(np.max([high for _, high, _ in asked], axis=0)) + MARGIN - first + 1).astype(int)
         shift = np.eye(5)
         shift[2:4, 4] = first
         if count.max() > 400:

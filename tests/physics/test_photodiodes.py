@@ -1,9 +1,7 @@
 """Photodiodes against a pixel whose microlens is traced: refraction, flight, and the photodiode that each ray
 hits.
 
-The tracer is that of `random_tracer`; of `vcc` it reads only the numbers of a camera. Nothing here knows that a
-microlens images the exit pupil: this follows from its place, which is such that the chief ray of a pixel's middle
-hits the middle of the photodiodes.
+The tracer is that of `random_tracer` and `traced_pixels`; of `vcc` it reads only the numbers of a camera.
 """
 
 from __future__ import annotations
@@ -18,48 +16,10 @@ import pytest
 import vcc
 from tests.physics.laws import TARGETS
 from tests.physics.random_cameras import BENT, Case, drawn
-from tests.physics.random_tracer import Bench, Plane, Scene, decibels
+from tests.physics.random_tracer import Plane, Scene, decibels
+from tests.physics.traced_pixels import Pixels
 from vcc.image import PhotodiodeImage
 from vcc.units import mm
-
-
-class Pixels(Bench):
-    """Rays counted by one photodiode.
-
-    Args:
-        case: camera, frame and views; its sensor says pitches, photodiodes and microlens.
-        place: (row, column) of the photodiode.
-        pupil: (x, y, distance before the sensor) of the middle of the exit pupil.
-    """
-
-    def __init__(self, case: Case, place: tuple[int, int], pupil: tuple[float, float, float]) -> None:
-        super().__init__(case.camera, case.frame, case.shape[:2], case.flown)
-        self.place, self.pupil = place, pupil
-        self.grid, self.microlens = case.camera.sensor.photodiodes, case.camera.sensor.microlens
-
-    def _walked(self, ray, drawn):
-        origin, through = super()._walked(ray, drawn)
-        x, y, s, t = ray
-        height = self.microlens.height or self.microlens.f_number * self.pitches[1]
-        for axis, (place, slope, centres, pitch) in enumerate(
-            ((x, s, self.x, self.pitches[1]), (y, t, self.y, self.pitches[0]))
-        ):
-            count, number = self.grid[1 - axis], self.place[1 - axis]
-            pixel = centres[np.rint((place - centres[0]) / pitch).astype(int)]
-            chief = (pixel - self.pupil[axis]) / self.pupil[2]
-            lens = pixel - height * chief  # a ray through the middle of a lens goes on straight
-            behind = slope - (place - lens) / height
-            hit = place + height * behind - pixel
-            # Shares beyond each inner edge; the outermost photodiodes have no outer edge.
-            edges = (np.arange(1, count) / count - 0.5) * pitch
-            ramp = self.microlens.crosstalk
-            share = [np.ones_like(hit), *(self._step(hit - edge, ramp) for edge in edges), np.zeros_like(hit)]
-            through = through * (share[number] - share[number + 1])
-        return origin, through
-
-    @staticmethod
-    def _step(away, ramp):
-        return (away >= 0) * 1.0 if ramp == 0 else np.clip(away / ramp + 0.5, 0, 1)
 
 
 def with_photodiodes(case: Case, grid: tuple[int, int], **microlens) -> Case:
@@ -130,7 +90,7 @@ def test_each_photodiode_has_the_light_that_its_microlens_sends_there(name):
     image = case.camera.capture(case.light_field, **({"samples": 4096} if case.kind == "lenslets" else {}))
     assert isinstance(image, PhotodiodeImage)
     places = list(itertools.product(*map(range, grid)))
-    truths = {place: Pixels(case, place, pupil).by_rays(case.scene, 1e-3, 65536) for place in places}
+    truths = {place: Pixels(case.camera, case, place, pupil).by_rays(case.scene, 1e-3, 65536) for place in places}
     peak = max(truth.max() for truth, _ in truths.values())
     for (row, column), (truth, error) in truths.items():
         found = image.photodiodes[row][column].to_numpy()

@@ -66,11 +66,21 @@ def test_a_pinhole_sees_the_fourth_power_of_the_cosine():
     down = np.where(tangent == 0, across, x / np.where(tangent == 0, 1.0, tangent))
     expected = np.pi * (1 * mm) ** 2 / (across * down) / (1 + tangent**2) ** 2
     np.testing.assert_allclose(image, expected, atol=5 * found.sampling_error)  # 41 pixels: five standard errors
-    assert found.sampling_error < 3e-3 * expected.max()
+    assert found.sampling_error < 5e-3 * expected.max()
     assert image[0] < 0.62 * image[20]
     paraxial = vcc.Camera([replace(lens, radiometry="paraxial")], sensor).capture(even, samples=1024).values[0]
     # The stop of radius r adds r²/d² to the mean of the weight's inverse, 1/400, and less off the axis.
     np.testing.assert_allclose(paraxial / image, (1 + tangent**2) ** 2, rtol=4e-3)
+
+
+def test_the_last_of_two_lenses_weighs_light_by_angle():
+    lens = vcc.RealLens.of(singlet(curved=1e3, stop=2 * mm))
+    window = Prescription((Surface(1e3, 1 * mm, 1.5, 30 * mm), Surface(np.inf, 0.0, 1.0, 30 * mm)))
+    sensor, even = vcc.Sensor(20 * mm, (1, 5), 4 * mm), field(EVEN, 90, 18e-3)
+    alone = vcc.Camera([lens], sensor).capture(even, samples=1024)
+    both = vcc.Camera([lens, vcc.RealLens.of(window, z=15 * mm)], sensor).capture(even, samples=1024)
+    # The window brings the sensor nearer by a third of its millimetre, of 20; cos⁴θ once more would take 13 %.
+    assert both.values[0, 0] / alone.values[0, 0] == pytest.approx(1.02, abs=0.02)
 
 
 def test_irradiance_on_the_axis_is_that_of_the_cone_of_light():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
+import vcc
 from vcc import Camera, InputError, Lens, LightField, Mask, Prism, Sensor
 from vcc.base.units import mm, um
 from vcc.plot import focused_distance, plot_camera, style
@@ -152,3 +153,32 @@ def test_pyplot_is_not_involved():
 def test_refuses(options, message):
     with pytest.raises(InputError, match=message):
         plot_camera(Camera([], SENSOR), **options)
+
+
+def test_bands_of_light_are_drawn_where_they_part():
+    """A prism alone: δ ∝ n − 1, so that a distant point's rays arrive at x = u + z·δ·(n − 1)/(n₀ − 1)."""
+    flint = vcc.glasses.Cauchy(1.6, 0.014e-12)
+    prism = vcc.Prism((0.1, 0.0), glass=flint, design_wavelength=550e-9)
+    camera = vcc.Camera([prism], vcc.Sensor(50 * mm, (10, 10), 1 * mm))
+    bands = (640e-9, 450e-9)
+    axes = camera.plot(wavelengths=bands, object_distances=[np.inf], rays=3)
+    handles = axes.get_legend().legend_handles
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
+        f"point parallel light, {band} nm" for band in (640, 450)
+    ]
+    for handle, band in zip(handles, bands, strict=True):
+        lines = [
+            line for line in axes.lines if line.get_color() == handle.get_color() and len(line.get_xdata()) == 2
+        ]
+        middle = [line.get_ydata() for line in lines if line.get_xdata()[-1] == pytest.approx(50)][1]
+        strength = (0.6 + 0.014 / (band * 1e6) ** 2) / (0.6 + 0.014 / 0.55**2)
+        assert middle[1] - middle[0] == pytest.approx(50 * 0.1 * strength, rel=1e-6)
+    views = np.ones((3, 3, 8, 8, 2), np.float32)
+    field = vcc.LightField.from_views(views, 1 * mm, 2e-3).with_wavelengths(bands)
+    labels = [text.get_text() for text in camera.plot(light_field=field).get_legend().get_texts()]
+    assert [label.rpartition(", ")[2] for label in labels] == ["450 nm", "640 nm"]
+    plain = camera.replace(prism=vcc.Prism((0.1, 0.0))).plot(light_field=field)
+    assert not any("nm" in text.get_text() for text in plain.get_legend().get_texts())
+    closed = vcc.Camera([vcc.Mask(vcc.patterns.Open(), spectrum=lambda wavelength: 0.0)], camera.sensor)
+    with pytest.raises(vcc.InputError, match="no light of 450 nm passes"):
+        closed.plot(wavelengths=[450e-9])

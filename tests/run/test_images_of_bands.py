@@ -133,14 +133,6 @@ def test_images_are_in_the_library_of_the_samples(light_field):
     assert not of_channel[[0, 1, 3]].any()
 
 
-def test_learning_through_glass_is_refused_with_its_reason(light_field):
-    pytest.importorskip("torch")
-    import vcc.torch
-
-    with pytest.raises(vcc.InputError, match=r"learning is not supported .*\"main\".*it has a plan for each band"):
-        vcc.torch.CameraModule(CAMERA, light_field, learn=["main.focal_length"])
-
-
 def test_warnings_are_said_once_and_name_the_worst_band(light_field):
     wide = vcc.Camera([LENS], vcc.Sensor(z=52.6 * mm, shape=(40, 40), pitch=0.1 * mm))
     with pytest.warns(vcc.ResultWarning) as said:

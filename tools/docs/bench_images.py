@@ -151,7 +151,7 @@ def decoded(bench: Bench) -> None:
 
 def compared(bench: Bench) -> None:
     """A plate of wavefront coding against the lens alone, by a wipe."""
-    bench.page.get_by_role("button", name="Pin").click()
+    bench.page.get_by_role("button", name="Pin", exact=True).click()
     bench.page.get_by_text("now · the same").wait_for()
     bench.page.get_by_label("Add an element").select_option("phase_plate")
     bench.settle()
@@ -270,14 +270,15 @@ def served() -> Iterator[str]:
     desk = Field(lambda progress: panels.desk().read())
     offered = Offered({"desk": desk}, Document(camera(), "desk"), Beside(Path(), frozenset()))
     with listening(LOOPBACK, 0) as socket:
-        app = application(offered, Door(), static_files())
+        door = Door.of()
+        app = application(offered, door, static_files())
         config = uvicorn.Config(app, log_level="critical", ws="websockets-sansio", timeout_graceful_shutdown=1)
         server = uvicorn.Server(config)
         thread = threading.Thread(target=server.run, kwargs={"sockets": [socket]}, daemon=True)
         thread.start()
         while not server.started:
             time.sleep(0.01)
-        yield f"http://{LOOPBACK}:{socket.getsockname()[1]}/"
+        yield f"http://{LOOPBACK}:{socket.getsockname()[1]}/?token={door.token}"
         server.should_exit = True
         thread.join(10)
 

@@ -2,9 +2,10 @@
 
 import { html, svg, css, nothing } from "lit";
 
-import type { Answer } from "./bench";
+import type { Answered } from "./bench";
 import { plain, short } from "./numbers";
-import type { Curve, Plane } from "./protocol";
+import { MARGIN, plotted } from "./plots";
+import type { Plane } from "./protocol";
 
 /** What can be asked, and how its tab is called. */
 export const QUESTIONS: [string, string][] = [
@@ -19,9 +20,9 @@ export const OF_A_POINT = ["point spread", "mtf"];
 
 const WIDE = 460;
 const HIGH = 230;
-const MARGIN = { left: 40, right: 12, top: 12, bottom: 38 };
+type Curve = [number, number][];
 
-export function drawnAnswer({ message, pictures }: Answer) {
+export function drawnAnswer({ message, pictures }: Answered) {
   switch (message.what) {
     case "explain":
       return html`<pre>${message.words}</pre>`;
@@ -33,6 +34,8 @@ export function drawnAnswer({ message, pictures }: Answer) {
       if (message.frame) return drawnInFrame(message.planes[0]!, message.frame, pictures[0] ?? "");
       return html`<div class="planes">${message.planes.map((plane, number) => drawnPlane(plane, pictures[number] ?? ""))}</div>
         <p class="quiet">Each plane: places across it from left to right, slopes of the rays there upwards.</p>`;
+    default:
+      return nothing;
   }
 }
 
@@ -78,18 +81,10 @@ function round(least: number, greatest: number): number[] {
 function drawnCurves(across: Curve, down: Curve, words: string) {
   const most = Math.max(across[across.length - 1]?.[0] ?? 1, down[down.length - 1]?.[0] ?? 1);
   if (!(most > 0)) return html`<p>All light of a point ${words} falls into one pixel: its contrast is that of the pixel itself.</p>`;
-  const x = (frequency: number) => MARGIN.left + (frequency / most) * (WIDE - MARGIN.left - MARGIN.right);
-  const y = (contrast: number) => HIGH - MARGIN.bottom - contrast * (HIGH - MARGIN.top - MARGIN.bottom);
-  const line = (curve: Curve) => "M" + curve.map(([frequency, contrast]) => `${x(frequency).toFixed(1)} ${y(contrast).toFixed(1)}`).join("L");
-  const power = 10 ** Math.floor(Math.log10(most));
-  const step = power * (most < 2.5 * power ? 0.5 : most < 5 * power ? 1 : 2);
-  const ticks = Array.from({ length: Math.floor(most / step + 1e-9) + 1 }, (_, number) => number * step);
-  return html`<svg viewBox="0 0 ${WIDE} ${HIGH}" class="curves" role="img" aria-label="Contrast over frequency of a point ${words}">
-    ${[0, 0.25, 0.5, 0.75, 1].map((each) => svg`<path class="grid" d="M${MARGIN.left} ${y(each)}H${WIDE - MARGIN.right}"></path>
-      <text x=${MARGIN.left - 6} y=${y(each) + 4} text-anchor="end">${each}</text>`)}
-    ${ticks.map((each) => svg`<text x=${x(each)} y=${HIGH - MARGIN.bottom + 16} text-anchor="middle">${plain(each, 3)}</text>`)}
-    <text x=${(MARGIN.left + WIDE - MARGIN.right) / 2} y=${HIGH - 5} text-anchor="middle">cycles per millimetre on the sensor, of a point ${words}</text>
-    <path class="across" d=${line(across)}></path><path class="down" d=${line(down)}></path></svg>
+  const axes = { width: WIDE, height: HIGH, most: [most, 1] as [number, number], levels: [0, 0.25, 0.5, 0.75, 1] };
+  return html`${plotted([{ points: across, name: "across" }, { points: down, name: "down" }], {
+      ...axes, words: `cycles per millimetre on the sensor, of a point ${words}`, label: `Contrast over frequency of a point ${words}`,
+    })}
     <p class="key"><i class="across"></i>across <i class="down"></i>down${same(across, down) ? html`<span class="quiet"> (the same)</span>` : nothing}</p>`;
 }
 
@@ -110,6 +105,8 @@ export const answerStyles = css`
   .curves path.grid { stroke: var(--line); stroke-width: 1; }
   .curves .across { stroke: var(--focused); }
   .curves .down { stroke: var(--near); stroke-dasharray: 5 3; }
+  .curves .grey { stroke: var(--ink); }
+  .curves .red { stroke: var(--red); } .curves .green { stroke: var(--green); } .curves .blue { stroke: var(--blue); }
   .key i { display: inline-block; width: 16px; height: 2px; vertical-align: 3px; margin-right: 5px; }
   .key i.across { background: var(--focused); }
   .key i.down { background: var(--near); margin-left: 14px; }

@@ -2,8 +2,9 @@
 
 import { read, written } from "./address";
 import type { Host } from "./host";
+import { metres } from "./numbers";
 import type {
-  AnswerMessage, BenchDocument, DecodedMessage, FromHost, Note, Parts, PictureMessage, RefocusedMessage, Side, SideAperture, SideElement, SideSensor, Table, Value, ValueMessage, Where,
+  Answer, BenchDocument, FromHost, Look, Note, Parts, PictureMessage, Pin, Side, SideAperture, SideElement, SideSensor, Table, Value, ValueMessage, Where,
 } from "./protocol";
 
 /** What is selected: an element's number, or one of the two that always are there. */
@@ -14,16 +15,21 @@ export interface Shown {
   about: PictureMessage;
 }
 
-/** What the host answered, and its pictures by their addresses. */
-export interface Answer {
-  message: AnswerMessage;
+/** What the host answered to a question, and its pictures by their addresses. */
+export interface Answered<What extends Answer["what"] = Answer["what"]> {
+  message: Extract<Answer, { what: What }>;
   pictures: string[];
 }
 
-/** After so long the newest place is sent although the picture of the last one has not come, milliseconds. */
+/** After so long the newest value is sent although the state of the last one has not come, milliseconds. */
 const PATIENCE = 150;
+/** After so long without a new value a hand that drags holds still, milliseconds. */
+const REST = 40;
+const REMARK = 12_000;
 const ADDRESS_AFTER = 250;
 const LONGEST_ADDRESS = 200_000;
+
+const PLAIN = JSON.stringify({ black: 0, linear: false, channel: null, photodiodes: "sum", axis: "x" });
 
 export interface Options {
   /** Whether the document stands in the page's address. */
@@ -42,19 +48,30 @@ export class Bench extends EventTarget {
   canRedo = false;
   selected: Selected = "sensor";
   picture: Shown | null = null;
+  /** Pinned states with their thumbnails, and the picture of the one that is compared with. */
+  pins: { about: Pin; thumbnail: string }[] = [];
   pinned: ImageBitmap | null = null;
+  look: Look = { black: 0, linear: false, channel: null, photodiodes: "sum", axis: "x" };
+  /** Of the presets, in their order. */
+  thumbnails: string[] = [];
+  /** Frames of a sweep. */
+  frames: { values: string[]; label: string; bitmaps: ImageBitmap[] } | null = null;
   value: ValueMessage | null = null;
   /** (rows, columns) of views, when the light field has been opened. */
   views: [number, number] | null = null;
   /** Why there is no picture. */
   without: string | null = null;
   refused: { words: string; where: Where | null } | null = null;
+  /** What the host did besides, or in another way. */
+  remark: string | null = null;
+  /** Centres of the light field's bands, metres, if it has them. */
+  bands: number[] | null = null;
   progress: { done: number; total: number; words: string } | null = null;
   /** The newest to each question. */
-  readonly answers = new Map<string, Answer>();
-  decoded: { message: DecodedMessage; pictures: string[] } | null = null;
+  readonly answers = new Map<string, Answered>();
+  decoded: Answered<"decoded"> | null = null;
   /** What was refocused since. */
-  refocused: { message: RefocusedMessage; picture: string } | null = null;
+  refocused: Answered<"refocused"> | null = null;
   /** Whether decoded views are still to come. */
   decoding = false;
   /** Whether a picture of what was asked last is still to come. */
@@ -68,10 +85,12 @@ export class Bench extends EventTarget {
   private selectAt = Infinity;
   private selectThen: Selected = "sensor";
   private accepted: BenchDocument | null = null;
-  private next: { where: Where; value: Value } | null = null;
+  next: { where: Where; value: Value } | null = null;
   private underway = 0;
   private timer = 0;
   private addressTimer = 0;
+  private remarkTimer = 0;
+  private restTimer = 0;
   private pictures = 0;
   private latestPicture = 0;
   private valueUnderway = false;
@@ -93,17 +112,21 @@ export class Bench extends EventTarget {
     window.removeEventListener("hashchange", this.addressChanged);
     window.clearTimeout(this.timer);
     window.clearTimeout(this.addressTimer);
+    window.clearTimeout(this.remarkTimer);
+    window.clearTimeout(this.restTimer);
     this.host.close();
   }
 
   // --- what is asked of the host ---
 
-  /** Change one value; while moving, only the newest is sent, when the picture of the one before has come. */
+  /** Change one value; while moving, only the newest is sent, when the host has taken the one before. */
   set(where: Where, value: Value, moving = false): void {
     if (this.document) this.document = patched(this.document, where, value);
+    window.clearTimeout(this.restTimer);
     if (moving) {
       this.next = { where, value };
       if (!this.underway) this.sendNext();
+      this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
     } else {
       this.next = null;
       this.settle();
@@ -112,16 +135,26 @@ export class Bench extends EventTarget {
     this.changed();
   }
 
+  /** A hand that holds still sees the whole picture. */
+  private rest(where: Where, value: Value): void {
+    this.next = null;
+    this.settle();
+    this.ask({ do: "set", where, value, moving: true, rests: true });
+    this.changed();
+  }
+
   act(message: { do: string } & { [name: string]: unknown }, buffers?: ArrayBuffer[]): void {
+    window.clearTimeout(this.restTimer);
     this.next = null;
     this.settle();
     this.ask(message, buffers);
     this.changed();
   }
 
-  add(kind: string, z: string): void {
+  /** The host finds a place that suits the kind, unless one is given. */
+  add(kind: string, z?: string): void {
     this.selectThen = this.elements.length;
-    this.act({ do: "add", kind, z });
+    this.act({ do: "add", kind, ...(z === undefined ? {} : { z }) });
     this.selectAt = this.turn;
   }
 
@@ -150,12 +183,34 @@ export class Bench extends EventTarget {
     this.host.send({ do: "export", what, ...options });
   }
 
-  pin(on: boolean): void {
-    this.host.send({ do: "pin", on });
-    if (!on) {
-      this.pinned = null;
-      this.changed();
-    }
+  /** Change how the picture is shown. */
+  show(look: Partial<Look>): void {
+    this.look = { ...this.look, ...look };
+    this.host.send({ do: "look", look: this.look, turn: this.turn });
+    this.changed();
+  }
+
+  pin(): void {
+    this.host.send({ do: "pin" });
+  }
+
+  unpin(number?: number): void {
+    this.host.send({ do: "unpin", ...(number === undefined ? {} : { number }) });
+  }
+
+  compareWith(number: number | null): void {
+    this.host.send({ do: "compare", number, turn: this.turn });
+  }
+
+  scrub(options: object): void {
+    this.frames = null;
+    this.question("scrub", options);
+  }
+
+  endScrub(): void {
+    this.frames?.bitmaps.forEach((each) => each.close());
+    this.frames = null;
+    this.changed();
   }
 
   select(selected: Selected): void {
@@ -165,7 +220,7 @@ export class Bench extends EventTarget {
   }
 
   forgive(): void {
-    this.refused = null;
+    this.refused = this.remark = null;
     this.changed();
   }
 
@@ -178,6 +233,18 @@ export class Bench extends EventTarget {
   partOf(selected: Selected): SideElement | SideSensor | SideAperture | undefined {
     if (selected === "light field") return this.side?.aperture ?? undefined;
     return selected === "sensor" ? this.side?.sensor : this.side?.elements[selected];
+  }
+
+  /** Where a part stands on the axis, metres. The document is the one source of places; the drawing follows it. */
+  placeOf(selected: Selected): number {
+    const table = this.tableOf(selected);
+    const z = metres(table?.["z"] ?? "0 mm");
+    return Number.isFinite(z) ? z : (this.partOf(selected)?.z ?? 0);
+  }
+
+  tableOf(selected: Selected): Table | undefined {
+    if (selected === "light field") return this.document?.aperture as unknown as Table | undefined;
+    return selected === "sensor" ? this.document?.camera.sensor : this.elements[selected];
   }
 
   whereOf(selected: Selected): Where {
@@ -195,7 +262,7 @@ export class Bench extends EventTarget {
     const wasSilent = this.silent;
     this.open = state === "open";
     this.silent = state === "silent";
-    if (!this.open) this.absent = this.document || this.silent ? this.host.lost : this.host.awaited;
+    if (!this.open) this.absent = this.host.why ?? (this.document || this.silent ? this.host.lost : this.host.awaited);
     if (this.silent || wasSilent) {
       // Nothing was lost: what was sent is still to be answered.
       this.changed();
@@ -206,6 +273,7 @@ export class Bench extends EventTarget {
     if (this.open) {
       const document = this.document ?? (this.options.address ? await read(window.location.hash) : null);
       this.ask({ do: "hello", ...(document ? { document } : {}) });
+      if (JSON.stringify(this.look) !== PLAIN) this.host.send({ do: "look", look: this.look, turn: this.turn });
     } else {
       this.progress = null;
       this.waiting = false;
@@ -217,56 +285,31 @@ export class Bench extends EventTarget {
     switch (message.is) {
       case "parts":
         this.parts = message;
+        this.thumbnails = buffers.map((each) => dataAddress(each));
         break;
       case "state":
-        this.side = message.side;
-        this.views = message.grid ? [message.grid[0]!, message.grid[1]!] : null;
-        this.canUndo = message.undo;
-        this.canRedo = message.redo;
-        this.accepted = message.document;
-        if (message.turn >= this.turn && !this.next) {
-          this.document = message.document;
-          this.keepAddress();
-        }
-        if (message.turn >= this.selectAt) {
-          this.selectAt = Infinity;
-          this.selected = this.selectThen;
-        }
-        if (typeof this.selected === "number" && this.selected >= this.side.elements.length)
-          this.selected = this.side.elements.length ? this.side.elements.length - 1 : "sensor";
+        this.hearState(message);
         break;
       case "notes":
         if (message.turn >= this.turn) this.notes = message.notes;
         break;
       case "no picture":
         this.without = message.words;
-        this.waiting = false;
-        this.progress = null;
-        this.settle();
-        this.sendNext();
+        this.finished();
         break;
       case "failed":
         this.refused = { words: message.words, where: null };
         this.decoding = false;
-        this.waiting = false;
-        this.progress = null;
-        this.settle();
-        this.sendNext();
+        this.finished();
         break;
       case "picture":
         if (message.turn >= this.turn && !message.coarse) this.waiting = false;
         this.without = null;
         this.progress = null;
-        if (message.turn >= this.underway) {
-          this.settle();
-          this.sendNext();
-        }
-        await this.show(message, buffers[0]);
+        await this.showPicture(message, buffers[0]);
         break;
-      case "pinned":
-        this.pinned?.close();
-        this.pinned = buffers[0] ? await decoded(buffers[0]) : null;
-        if (this.picture) this.picture.about = { ...this.picture.about, same: this.pinned !== null };
+      case "pins":
+        await this.hearPins(message.pins, buffers);
         break;
       case "value":
         this.value = message;
@@ -274,22 +317,14 @@ export class Bench extends EventTarget {
         if (this.nextValue) this.askValue(...this.nextValue);
         break;
       case "answer":
-        this.hearAnswer(message, buffers.map(dataAddress));
+        await this.hearAnswer(message, buffers);
         break;
       case "file":
         if (buffers[0]) saved(message.name, message.type, buffers[0]);
         this.progress = null;
         break;
       case "refused":
-        this.refused = { words: message.words, where: message.where ?? null };
-        this.decoding = false;
-        this.selectAt = Infinity;
-        this.waiting = false;
-        this.progress = null;
-        this.valueUnderway = false;
-        this.settle();
-        if (!this.next) this.document = this.accepted;
-        this.sendNext();
+        this.hearRefused(message);
         break;
       case "progress":
         this.progress = message.done < message.total ? message : null;
@@ -298,8 +333,80 @@ export class Bench extends EventTarget {
     this.changed();
   }
 
-  private hearAnswer(message: AnswerMessage | DecodedMessage | RefocusedMessage, pictures: string[]): void {
-    if (message.what === "refocused") this.refocused = { message, picture: pictures[0]! };
+  private hearState(message: Extract<FromHost, { is: "state" }>): void {
+    this.side = message.side;
+    this.views = message.grid ? [message.grid[0]!, message.grid[1]!] : null;
+    this.bands = message.bands;
+    this.canUndo = message.undo;
+    this.canRedo = message.redo;
+    this.accepted = message.document ?? this.accepted;
+    if (message.document && message.turn >= this.turn && !this.next) {
+      this.document = message.document;
+      this.keepAddress();
+    }
+    if (message.turn >= this.selectAt) {
+      this.selectAt = Infinity;
+      this.selected = this.selectThen;
+    }
+    if (typeof this.selected === "number" && this.selected >= this.side.elements.length)
+      this.selected = this.side.elements.length ? this.side.elements.length - 1 : "sensor";
+    if (message.turn >= this.underway) {
+      this.settle();
+      this.sendNext();
+    }
+  }
+
+  private hearRefused(message: Extract<FromHost, { is: "refused" }>): void {
+    if (message.done) {
+      this.remark = message.words;
+      window.clearTimeout(this.remarkTimer);
+      this.remarkTimer = window.setTimeout(() => {
+        this.remark = null;
+        this.changed();
+      }, REMARK);
+      return;
+    }
+    this.refused = { words: message.words, where: (message.where as Where | null) ?? null };
+    this.decoding = false;
+    this.selectAt = Infinity;
+    this.valueUnderway = false;
+    if (!this.next && message.turn >= this.turn) this.document = this.accepted; // the host's state follows
+    this.finished();
+  }
+
+  /** What was asked is answered, in one way or another. */
+  private finished(): void {
+    this.waiting = false;
+    this.progress = null;
+    this.settle();
+    this.sendNext();
+  }
+
+  private async hearPins(pins: Pin[], buffers: DataView[]): Promise<void> {
+    this.pins = pins.map((about, number) => ({ about, thumbnail: dataAddress(buffers[number]!) }));
+    const bitmap = buffers[pins.length] ? await decoded(buffers[pins.length]!) : null;
+    this.pinned?.close();
+    this.pinned = bitmap;
+    if (!bitmap && this.picture) this.picture.about = { ...this.picture.about, psnr: null, same: false };
+    else if (this.picture && pins.at(-1)?.compared && pins.at(-1)?.same && !this.waiting && this.fresh(pins))
+      this.picture.about = { ...this.picture.about, psnr: null, same: true };
+    this.pinCount = pins.length;
+  }
+
+  /** Whether a state was pinned just now: its picture is the one that is shown. */
+  private fresh(pins: Pin[]): boolean {
+    return pins.length > this.pinCount;
+  }
+  private pinCount = 0;
+
+  private async hearAnswer(message: Answer, buffers: DataView[]): Promise<void> {
+    if (message.what === "scrub") {
+      this.progress = null;
+      this.frames = { values: message.values, label: message.label, bitmaps: await Promise.all(buffers.map(decoded)) };
+      return;
+    }
+    const pictures = buffers.map((each) => dataAddress(each));
+    if (message.what === "refocused") this.refocused = { message, pictures };
     else if (message.what === "decoded") {
       this.decoded = { message, pictures };
       this.refocused = null;
@@ -308,7 +415,7 @@ export class Bench extends EventTarget {
   }
 
   /** Pictures are decoded beside one another; one that is older than what is shown is not shown. */
-  private async show(about: PictureMessage, bytes: DataView | undefined): Promise<void> {
+  private async showPicture(about: PictureMessage, bytes: DataView | undefined): Promise<void> {
     if (!bytes) return;
     const number = ++this.pictures;
     const bitmap = await decoded(bytes);
@@ -394,9 +501,10 @@ function bytesOf(view: DataView): Uint8Array<ArrayBuffer> {
 
 /** A picture's address that any page may show, whatever its policy says of those made in it. */
 function dataAddress(view: DataView): string {
+  const bytes = bytesOf(view);
   let letters = "";
-  for (const byte of bytesOf(view)) letters += String.fromCharCode(byte);
-  return `data:image/jpeg;base64,${btoa(letters)}`;
+  for (const byte of bytes) letters += String.fromCharCode(byte);
+  return `data:image/${bytes[0] === 0xff ? "jpeg" : "webp"};base64,${btoa(letters)}`;
 }
 
 function decoded(view: DataView): Promise<ImageBitmap> {

@@ -4,7 +4,7 @@ import { html, css, nothing } from "lit";
 
 import { Part, controls } from "./part";
 import { short } from "./numbers";
-import type { BenchDocument, DecodedMessage } from "./protocol";
+import type { BenchDocument, DecodedAnswer } from "./protocol";
 
 /** Steps of the slider, even in 1/distance, as blur is. */
 const STEPS = 60;
@@ -65,21 +65,21 @@ export class DecodedView extends Part {
     if (!bench.decoded) return html`<p class="quiet">Decoding …</p>`;
     const { message, pictures } = bench.decoded;
     if (message.why !== undefined) return html`<p>This camera cannot be decoded: ${message.why}.</p>`;
-    const refocused = bench.refocused ?? { message, picture: pictures[2] ?? "" };
-    const [rows, columns] = message.views;
-    const [down, across] = message.shape;
-    const sharp = away(refocused.message.distance);
+    const [shown, distance] = bench.refocused ? [bench.refocused.pictures[0], bench.refocused.message.distance] : [pictures[2], message.distance ?? null];
+    const [rows, columns] = message.views ?? [0, 0];
+    const [down, across] = message.shape ?? [0, 0];
+    const sharp = away(distance);
     return html`
       <div class="figures">
-        <figure><img src=${refocused.picture} alt="Picture refocused on what is ${sharp}"><figcaption>${this.slider(message)}</figcaption></figure>
+        <figure><img src=${shown ?? ""} alt="Picture refocused on what is ${sharp}"><figcaption>${this.slider(message)}</figcaption></figure>
         <figure><img src=${pictures[0] ?? ""} alt="Sheet of all ${rows} by ${columns} views"><figcaption>${message.words}, as they stand in the lens</figcaption></figure>
         <figure><img src=${pictures[1] ?? ""} alt="The middle view"><figcaption>The middle view, ${across} pixels wide and ${down} high</figcaption></figure>
       </div>
-      ${message.remarks.map((words) => html`<p class="advice">${words}</p>`)}`;
+      ${(message.remarks ?? []).map((words) => html`<p class="advice">${words}</p>`)}`;
   }
 
-  private slider(message: DecodedMessage & { why?: undefined }) {
-    const [near, end, focus] = [message.nearest, message.farthest, message.focus].map(vergence) as [number, number, number];
+  private slider({ nearest = null, farthest = null, focus: own = null }: DecodedAnswer) {
+    const [near, end, focus] = [nearest, farthest, own].map(vergence) as [number, number, number];
     const at = this.chosen ?? focus;
     const words = away(at > 0 ? 1 / at : null);
     const step = near === end ? 0 : (Math.min(Math.max((near - at) / (near - end), 0), 1)) * STEPS;
@@ -93,7 +93,7 @@ export class DecodedView extends Part {
           this.choose(near + ((end - near) * Math.min(Math.max(Math.round(step + by), 0), STEPS)) / STEPS);
         }}
         @input=${(event: Event) => this.choose(near + ((end - near) * Number((event.target as HTMLInputElement).value)) / STEPS)}>
-      <span class="ends quiet"><span>nearest: ${far(message.nearest)}</span><span>farthest: ${far(message.farthest)}</span></span>`;
+      <span class="ends quiet"><span>nearest: ${far(nearest)}</span><span>farthest: ${far(farthest)}</span></span>`;
   }
 
   static override styles = [

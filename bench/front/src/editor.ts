@@ -4,9 +4,9 @@ import { html, css, nothing } from "lit";
 
 import type { Selected } from "./bench";
 import { fields } from "./fields";
-import { inMillimetres } from "./numbers";
+import { plain, withUnit } from "./numbers";
 import { Part, controls } from "./part";
-import type { Kind, Parameter } from "./protocol";
+import type { Kind, Parameter, Table } from "./protocol";
 import { sign } from "./signs";
 
 /** Of the light field's aperture, as elements have them. */
@@ -21,6 +21,11 @@ export class EditorView extends Part {
     const field = this.renderRoot.querySelector<HTMLInputElement>('input[id$="-z"]');
     field?.focus();
     field?.select();
+  }
+
+  protected override watched() {
+    const { document, side, notes, refused, selected, parts, views, bands } = this.bench;
+    return [document, side, notes, refused, selected, parts, views, bands];
   }
 
   /** The name of what is selected is in sight, however many there are. */
@@ -57,7 +62,7 @@ export class EditorView extends Part {
       </div>
       <div class="adds"><select aria-label="Add an element" @change=${this.add}>
         <option value="" selected>+ Add …</option>
-        ${bench.parts.kinds.map((kind) => html`<option value=${kind.kind} title=${kind.words}>${kind.kind.replaceAll("_", " ")}</option>`)}</select></div>
+        ${bench.parts.kinds.filter((kind) => kind.addable !== false).map((kind) => html`<option value=${kind.kind} title=${kind.words}>${kind.kind.replaceAll("_", " ")}</option>`)}</select></div>
       <div id="form" class="form" role="tabpanel" aria-labelledby="tab-${bench.selected}">${this.form()}</div>`;
   }
 
@@ -99,7 +104,20 @@ export class EditorView extends Part {
       ${bench.views ? [0, 1].map((axis) => this.viewRange(axis as 0 | 1, bench.views!)) : nothing}
       ${document.views ? html`<div class="field"><span></span><button @click=${() => bench.set(["views"], null)}>All views</button></div>` : nothing}
       <p class="quiet">Where the views stand: before the entrance plane, z = 0, or behind it, right and down of the axis.</p>
-      ${fields(bench, APERTURE, document.aperture, ["aperture"])}`;
+      ${fields(bench, APERTURE, document.aperture as unknown as Table, ["aperture"])}
+      ${this.wavelengths()}`;
+  }
+
+  /** Of the channels: the light field's own, or others. Elements of glass need them. */
+  private wavelengths() {
+    const { bench } = this;
+    const own = bench.bands?.map((each) => `${plain(each * 1e9, 5)} nm`).join(", ") ?? "";
+    const given = bench.document!.wavelengths;
+    return html`<div class="field"><label for="wavelengths" title="Of the channels; elements of glass and diffractive ones depend on them">wavelengths</label>
+      <input id="wavelengths" type="text" .value=${given ? given.join(", ") : ""} placeholder=${own || "none"} @change=${(event: Event) => {
+        const words = (event.target as HTMLInputElement).value.trim();
+        bench.set(["wavelengths"], words ? words.split(",").map((each) => withUnit(each, null, "nm")) : null);
+      }}></div>`;
   }
 
   /** From which to which row or column of views. */
@@ -122,15 +140,7 @@ export class EditorView extends Part {
     const select = event.target as HTMLSelectElement;
     const kind = select.value;
     select.value = "";
-    if (!kind) return;
-    // In the middle of the widest gap between what there is.
-    const side = this.bench.side;
-    const places = [0, ...(side?.elements.map((each) => each.z) ?? []), side?.sensor.z ?? 0].sort((one, other) => one - other);
-    let [from, to] = [places[0]!, places[places.length - 1]!];
-    let widest = -1;
-    for (let at = 1; at < places.length; at++)
-      if (places[at]! - places[at - 1]! > widest) [from, to, widest] = [places[at - 1]!, places[at]!, places[at]! - places[at - 1]!];
-    this.bench.add(kind, inMillimetres(Math.round((from + to) * 5e3) / 1e4));
+    if (kind) this.bench.add(kind); // the host finds a place that suits it
   }
 
   private key(event: KeyboardEvent): void {
@@ -158,7 +168,10 @@ export class EditorView extends Part {
       .verbs { display: flex; }
       .field { display: grid; grid-template-columns: minmax(86px, 132px) minmax(0, 1fr); align-items: center; gap: 4px 10px; min-height: 34px; }
       .field > label, .field > span:first-child { color: var(--quiet); overflow-wrap: anywhere; line-height: 1.2; }
-      .field > input[type="text"], .field > select { width: 100%; max-width: 260px; }
+      .field > input[type="text"], .field > select, .field > .quantity { width: 100%; max-width: 260px; }
+      .quantity { display: flex; align-items: center; position: relative; }
+      .quantity input { flex: 1; padding-right: 42px; }
+      .quantity .unit { position: absolute; right: 9px; color: var(--quiet); pointer-events: none; }
       .field > button { justify-self: start; border-color: var(--line); }
       .field output { overflow-wrap: anywhere; }
       .field:has(.cells) { align-items: start; }

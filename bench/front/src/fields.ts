@@ -3,7 +3,7 @@
 import { html, nothing, type TemplateResult } from "lit";
 
 import type { Bench } from "./bench";
-import { stepped, withUnit } from "./numbers";
+import { shortened, split, stepped, withUnit } from "./numbers";
 import type { Kind, Parameter, Table, Value, Where } from "./protocol";
 
 const UNITS = { length: "mm", angle: "deg", time: "ms" };
@@ -62,6 +62,7 @@ function input(bench: Bench, parameter: Parameter, value: Value, where: Where): 
 function words(bench: Bench, parameter: Parameter, value: Value, where: Where): TemplateResult {
   const before = value ?? parameter.default;
   const hint = parameter.needed ? "" : parameter.default === null || parameter.default === "" ? "none" : inWords(parameter.default);
+  const scalar = parameter.unit !== null && !Array.isArray(before) && !parameter.takes.includes("list");
   const moves = parameter.takes.some((each) => each === "number" || each === "whole number");
   let timer = 0;
   const changed = (event: Event) => {
@@ -69,32 +70,47 @@ function words(bench: Bench, parameter: Parameter, value: Value, where: Where): 
     delete box.dataset["edited"];
     window.clearTimeout(timer);
     const next = box.value.trim() === "" ? null : asValue(parameter, box.value, before);
-    if (inWords(next) !== inWords(value)) bench.set(where, next);
-    else box.value = inWords(value);
+    // What is shown is shortened: as long as nothing else was typed the value stays as exact as it is.
+    if (box.value !== shownIn(value, scalar) && inWords(next) !== inWords(value)) bench.set(where, next);
+    else box.value = shownIn(value, scalar);
   };
   const key = (event: KeyboardEvent) => {
     const box = event.target as HTMLInputElement;
     if (event.key === "Escape") {
-      box.value = inWords(value);
+      box.value = shownIn(value, scalar);
       delete box.dataset["edited"];
       bench.forgive();
     }
     const by = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (!by || !moves) return;
-    const from = box.value || inWords(parameter.default);
+    const from = box.value ? inWords(asValue(parameter, box.value, before)) : inWords(parameter.default);
     const whole = parameter.takes.includes("whole number") && !parameter.takes.includes("number");
     const moved = whole ? String(Number(from) + by) : stepped(from, by * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1));
     if (moved === null) return;
     event.preventDefault();
-    box.value = moved;
     const next = asValue(parameter, moved, before);
+    box.value = shownIn(next, scalar);
     bench.set(where, next, true);
     window.clearTimeout(timer);
     timer = window.setTimeout(() => bench.set(where, next), PAUSE);
   };
-  return html`<input id=${where.join("-")} type="text" inputmode=${parameter.takes.includes("text") ? "text" : "decimal"} autocomplete="off" spellcheck="false"
-    .value=${inWords(value)} placeholder=${hint} @input=${(event: Event) => ((event.target as HTMLInputElement).dataset["edited"] = "")}
+  const box = html`<input id=${where.join("-")} type="text" inputmode=${parameter.takes.includes("text") ? "text" : "decimal"} autocomplete="off" spellcheck="false"
+    .value=${shownIn(value, scalar)} title=${inWords(value)} placeholder=${scalar ? shownIn(parameter.default, true) || hint : hint} @input=${(event: Event) => ((event.target as HTMLInputElement).dataset["edited"] = "")}
     @change=${changed} @keydown=${key}>`;
+  return scalar ? html`<span class="quantity">${box}<span class="unit">${unitOf(before) || UNITS[parameter.unit!]}</span></span>` : box;
+}
+
+/** The unit that a bare number gets, as it is shown behind the field. */
+function unitOf(value: Value): string {
+  return shortened(inWords(value)).replace(/^[^a-zA-Zµ°]*/, "");
+}
+
+/** What a field shows: of a quantity the number, since its unit stands behind it. */
+function shownIn(value: Value, scalar: boolean): string {
+  if (Array.isArray(value)) return value.map((each) => shownIn(each, false)).join(", ");
+  const words = shortened(inWords(value));
+  const parts = scalar ? split(words) : null;
+  return parts && Number.isFinite(parts.number) ? words.slice(0, words.length - parts.unit.length).trim() : words;
 }
 
 /** A table that may be there or not: a sensor's electronics. */

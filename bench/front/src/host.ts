@@ -10,6 +10,8 @@ export interface Host {
   /** What is said while it is not open, the first time and later. */
   readonly awaited: string;
   readonly lost: string;
+  /** Why the other side closed the connection, if it said so. */
+  readonly why: string | null;
   /** Begins; handlers are set before. */
   start(): void;
   /** Ends for good. */
@@ -44,9 +46,16 @@ export function unpacked(frame: ArrayBuffer): { message: FromHost; buffers: Data
 }
 
 /** What the server takes of one message, bytes: `LARGEST_MESSAGE` of vcc/bench/server.py, which closes at more. */
-const LARGEST_MESSAGE = 2 ** 20;
+const LARGEST_MESSAGE = 2 ** 25;
+/** Close codes of vcc/bench/server.py, and of WebSockets: what to say, and whether another try may help. */
+const CLOSED: { [code: number]: { words: string; again: boolean } } = {
+  4403: { words: "This address lacks the token of the bench, or has that of an earlier one: open the address that vcc bench printed.", again: false },
+  1013: { words: "The bench has no room for another client, or this one read too slowly. It tries again.", again: true },
+  1008: { words: "The bench did not understand this page and closed the connection: reload the page.", again: false },
+  1009: { words: `A message was too large: a bench takes up to ${LARGEST_MESSAGE / 2 ** 20} MiB at once. Reload the page, or open the camera as a file.`, again: false },
+};
 const FIRST_WAIT = 300;
-const LONGEST_WAIT = 3000;
+const LONGEST_WAIT = 10_000;
 
 /** What is read of a message that is not sent. */
 type Sent = { do: string; turn?: number; where?: Where | null; name?: string };
@@ -57,6 +66,7 @@ export class SocketHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for the server …";
   readonly lost = "The server is gone. What you see stays; the bench goes on when the server is back.";
+  why: string | null = null;
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
   private timer = 0;
@@ -72,19 +82,23 @@ export class SocketHost implements Host {
     const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    socket.onopen = () => {
-      this.wait = FIRST_WAIT;
-      this.onstate("open");
-    };
     socket.onmessage = (event) => {
       const { message, buffers } = unpacked(event.data as ArrayBuffer);
-      if (message.is === "key") this.key = message.key;
-      else this.onmessage(message, buffers);
+      if (message.is !== "key") {
+        if (message.is === "picture") this.wait = FIRST_WAIT; // only what works ends the backing off
+        this.onmessage(message, buffers);
+        return;
+      }
+      this.key = message.key;
+      this.onstate("open");
     };
-    socket.onclose = () => {
+    socket.onclose = ({ code }) => {
       this.socket = null;
       if (this.ended) return;
+      const why = CLOSED[code];
+      this.why = why?.words ?? null;
       this.onstate("closed");
+      if (why && !why.again) return;
       this.timer = window.setTimeout(() => this.start(), this.wait);
       this.wait = Math.min(2 * this.wait, LONGEST_WAIT);
     };
@@ -100,10 +114,10 @@ export class SocketHost implements Host {
   /** Say what is too large; a greeting goes without its document, so that the bench goes on with what the server has. */
   private refuse(message: Sent, bytes: number): void {
     const greets = message.do === "hello";
-    const what = greets ? "the camera file" : message.do === "upload" ? `the file ${message.name ?? ""}`.trim() : "what was to be sent";
+    const what = greets ? "The camera of this page" : message.do === "upload" ? `The file ${message.name ?? ""}`.trim() : "What was to be sent";
     const end = greets ? "the bench shows the server's" : "nothing was changed: make it smaller, or name the file in the camera file that the bench is started with";
-    const words = `${what} has ${(bytes / 2 ** 20).toFixed(1)} MiB, and a bench takes up to ${LARGEST_MESSAGE / 2 ** 20} MiB at once; ${end}`;
-    this.onmessage({ is: "refused", words, where: message.where ?? null, do: message.do, turn: message.turn }, []);
+    const words = `${what} has ${(bytes / 2 ** 20).toFixed(1)} MiB, and a bench takes up to ${LARGEST_MESSAGE / 2 ** 20} MiB at once; ${end}.`;
+    this.onmessage({ is: "refused", words, where: message.where ?? null, do: message.do, turn: message.turn ?? 0 }, []);
     if (greets) this.send({ ...message, document: undefined });
   }
 
@@ -134,6 +148,7 @@ export class WidgetHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for Python …";
   readonly lost = "Python does not answer: it runs a cell, and then the bench goes on; or it was restarted, and then the cell of the bench is to be run again.";
+  readonly why = null;
   private timer = 0;
   private silent = false;
   private readonly hears = (message: FromHost | Heard, buffers?: DataView[]) => {

@@ -15,7 +15,7 @@ export function metres(words: unknown): number {
   if (typeof words === "number") return words;
   const parts = split(String(words));
   const unit = parts && METRES[parts.unit];
-  return parts && unit ? parts.number * unit : NaN;
+  return parts && unit && Number.isFinite(parts.number) ? parts.number * unit : NaN;
 }
 
 /** At most so many digits, no trailing zeros, no exponent for what people write without. */
@@ -23,6 +23,16 @@ export function plain(value: number, digits = 6): string {
   if (!Number.isFinite(value)) return value > 0 ? "∞" : value < 0 ? "−∞" : "–";
   const rounded = Number(value.toPrecision(digits));
   return Math.abs(rounded) >= 1e-6 || rounded === 0 ? rounded.toString() : rounded.toExponential();
+}
+
+/** The words with a number of at most nine digits: "88.418708240534514 mm" is shown as "88.4187082 mm", and um as µm. */
+export function shortened(words: string): string {
+  const parts = split(words);
+  if (!parts || !Number.isFinite(parts.number)) return words;
+  const unit = parts.unit === "um" ? "µm" : parts.unit;
+  const digits = words.replace(/[eE].*|[^\d]/g, "").replace(/^0+/, "").length;
+  const number = digits > 9 ? String(Number(parts.number.toPrecision(9))) : words.trim().slice(0, words.trim().length - parts.unit.length).trim();
+  return unit ? `${number} ${unit}` : number;
 }
 
 /** Millimetres to the nanometre, as a place on the axis is sent. */
@@ -39,10 +49,13 @@ export function short(length: number, digits = 4): string {
   return `${plain(length * 1e6, digits)} µm`;
 }
 
-/** What was typed, with the unit of the value before where none was typed: "41.5" becomes "41.5 mm". */
+/**
+ * What was typed, with the unit of the value before where none was typed: "41.5" becomes "41.5 mm". What no number holds
+ * ("1e400 mm") goes as it was typed, and the host says what is wrong.
+ */
 export function withUnit(typed: string, before: unknown, otherwise: string): string {
   const parts = split(typed);
-  if (!parts) return typed;
+  if (!parts || !Number.isFinite(parts.number)) return typed;
   const unit = parts.unit || (typeof before === "string" && split(before)?.unit) || otherwise;
   return `${parts.number}${unit ? ` ${unit}` : ""}`;
 }

@@ -7,12 +7,24 @@ import type { Bench } from "./bench";
 export class Part extends LitElement {
   static override properties: Record<string, object> = { bench: { attribute: false } };
   declare bench: Bench;
-  private readonly follow = () => this.requestUpdate();
+  private seen: unknown[] | null = null;
+  private readonly follow = () => {
+    const now = this.watched();
+    const same = now !== null && this.seen !== null && now.every((each, at) => each === this.seen![at]);
+    this.seen = now;
+    if (!same) this.requestUpdate();
+  };
+
+  /** What of the bench this view shows: it is drawn again where something of that has changed; null for any change. */
+  protected watched(): unknown[] | null {
+    return null;
+  }
 
   override connectedCallback(): void {
     super.connectedCallback();
     this.bench.addEventListener("change", this.follow);
     // A notebook takes cells out of the page and puts them back; meanwhile much may have changed.
+    this.seen = null;
     this.requestUpdate();
   }
 

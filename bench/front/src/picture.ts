@@ -2,12 +2,14 @@
 
 import { html, css, nothing } from "lit";
 
-import { plain } from "./numbers";
+import { answerStyles } from "./answers";
+import { drawPictures, type Compare } from "./canvas";
+import { plain, short } from "./numbers";
 import { Part, controls } from "./part";
+import { plotted } from "./plots";
 import type { PictureMessage } from "./protocol";
 import { sign } from "./signs";
 
-type Compare = "alone" | "beside" | "wipe" | "difference";
 const MODES: [Compare, string][] = [["alone", "Picture"], ["beside", "Side by side"], ["wipe", "Wipe"], ["difference", "Difference ×4"]];
 const MOST_ZOOM = 64;
 const WHEEL = 0.0016;
@@ -24,7 +26,7 @@ interface Place {
 export class PictureView extends Part {
   static override properties = {
     ...Part.properties, zoom: { state: true }, compare: { state: true }, wipe: { state: true }, aiming: { state: true }, at: { state: true },
-    width: { state: true }, height: { state: true },
+    width: { state: true }, height: { state: true }, levels: { state: true }, measures: { state: true }, line: { state: true }, frame: { state: true },
   };
   /** Times what fits. */
   declare zoom: number;
@@ -35,15 +37,21 @@ export class PictureView extends Part {
   declare at: Place | null;
   declare width: number;
   declare height: number;
+  /** Whether the levels are shown, and whether a line is drawn to read a profile along. */
+  declare levels: boolean;
+  declare measures: boolean;
+  /** The ends of that line, pixels of the picture. */
+  declare line: [Place, Place] | null;
+  /** Of a sweep's frames, the one that is shown. */
+  declare frame: number;
   /** What stands in the middle, as a share of the picture. */
   private middle: Place = { x: 0.5, y: 0.5 };
   private readonly pointers = new Map<number, Place>();
-  private gesture: "pan" | "wipe" | null = null;
+  private gesture: "pan" | "wipe" | "line" | null = null;
   private travelled = 0;
   private asked: PictureMessage | null = null;
   /** What the canvas shows: what looks the same is not drawn again, while other things move. */
   private drawn: unknown[] = [];
-  private readonly scratch = document.createElement("canvas");
   private readonly watch = new ResizeObserver(([entry]) => {
     this.width = entry!.contentRect.width;
     this.height = entry!.contentRect.height;
@@ -54,8 +62,9 @@ export class PictureView extends Part {
     this.zoom = 1;
     this.compare = "alone";
     this.wipe = 0.5;
-    this.aiming = false;
-    this.at = null;
+    this.aiming = this.levels = this.measures = false;
+    this.at = this.line = null;
+    this.frame = 0;
     this.width = this.height = 0;
   }
 
@@ -76,18 +85,25 @@ export class PictureView extends Part {
     this.watch.disconnect();
   }
 
+  protected override watched() {
+    const { picture, pins, pinned, value, without, look, frames, document, answers, waiting } = this.bench;
+    return [picture, picture?.about, pins, pinned, value, without, look, frames, document?.exposure, document?.noise, document?.camera.sensor["shape"], answers.get("profile"), waiting];
+  }
+
   private get canvas(): HTMLCanvasElement {
     return this.renderRoot.querySelector("canvas")!;
   }
 
   /** Rows and columns of the full picture, the sensor's pixels. */
   private get shape(): [number, number] {
+    const about = this.bench.picture?.about;
     const shape = this.bench.document?.camera.sensor["shape"];
-    return Array.isArray(shape) ? [Number(shape[0]), Number(shape[1])] : (this.bench.picture?.about.shape ?? [1, 1]);
+    const [down, across] = about?.look.photodiodes === "apart" ? about.photodiodes : [1, 1];
+    return Array.isArray(shape) ? [Number(shape[0]) * down, Number(shape[1]) * across] : (about?.shape ?? [1, 1]);
   }
 
   private get mode(): Compare {
-    return this.bench.pinned ? this.compare : "alone";
+    return this.bench.pinned && !this.bench.frames ? this.compare : "alone";
   }
 
   /** Width of one of the pictures shown, and where each begins. */
@@ -167,7 +183,9 @@ export class PictureView extends Part {
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, place);
     this.travelled = 0;
-    this.gesture = this.onWipe(place) ? "wipe" : "pan";
+    const pixel = this.pixelAt(place);
+    this.gesture = this.onWipe(place) ? "wipe" : this.measures && pixel && this.pointers.size === 1 ? "line" : "pan";
+    if (this.gesture === "line") this.line = [pixel!, pixel!];
   }
 
   private onWipe(place: Place): boolean {
@@ -184,6 +202,7 @@ export class PictureView extends Part {
     }
     this.travelled += Math.hypot(place.x - before.x, place.y - before.y);
     if (this.gesture === "wipe") this.wipe = Math.min(Math.max(place.x / this.width, 0), 1);
+    else if (this.gesture === "line" && this.line) this.line = [this.line[0], this.pixelAt(place) ?? this.line[1]];
     else if (this.pointers.size === 2) {
       const other = [...this.pointers].find(([id]) => id !== event.pointerId)![1];
       const apart = (one: Place) => Math.max(Math.hypot(one.x - other.x, one.y - other.y), 1);
@@ -194,6 +213,12 @@ export class PictureView extends Part {
 
   private up(event: PointerEvent): void {
     const began = this.pointers.delete(event.pointerId);
+    if (began && this.gesture === "line") {
+      this.gesture = null;
+      if (this.travelled <= 4) this.line = null;
+      this.askProfile();
+      return;
+    }
     if (!began || this.travelled > 4 || this.gesture === "wipe") return;
     const pixel = this.pixelAt(this.placeOf(event));
     this.point(pixel);
@@ -230,12 +255,45 @@ export class PictureView extends Part {
         this.middle = { x: (x + 0.5) / columns, y: (y + 0.5) / rows };
         this.keepWithin();
       }
-    } else if (event.key === "+" || event.key === "=") this.zoomTo(this.zoom * 1.5);
+      if (this.line && this.measures && this.gesture === null) {
+        this.line = [this.line[0], { x, y }];
+        this.askProfile();
+      }
+    } else if (event.key === "p") this.measure(this.at);
+    else if (event.key === "+" || event.key === "=") this.zoomTo(this.zoom * 1.5);
     else if (event.key === "-") this.zoomTo(this.zoom / 1.5);
     else if (event.key === "0") this.zoomTo(1);
     else if (event.key === "Enter" && this.at) this.focusOn(this.at);
     else return;
     event.preventDefault();
+  }
+
+  /** Begin or end reading along lines; by keys a line begins at the pixel that is pointed at, and follows it. */
+  private measure(from: Place | null = null): void {
+    this.measures = !this.measures;
+    this.line = this.measures && from ? [from, from] : null;
+    this.aiming = false;
+  }
+
+  private askProfile(): void {
+    const about = this.bench.picture?.about;
+    if (!this.line || !about || about.coarse || this.bench.look.photodiodes === "apart") return;
+    const [one, other] = this.line;
+    if (one.x !== other.x || one.y !== other.y) this.bench.question("profile", { ends: [one.x, one.y, other.x, other.y] });
+  }
+
+  private saveAsShown(): void {
+    this.canvas.toBlob((blob) => {
+      if (!blob) return;
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = "as-shown.png";
+      link.hidden = true;
+      document.body.append(link);
+      link.click();
+      link.remove();
+      window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+    });
   }
 
   // --- drawing ---
@@ -246,17 +304,19 @@ export class PictureView extends Part {
     if (about === this.asked || !about || about.coarse) return;
     this.asked = about;
     if (this.at) this.bench.askValue(this.at.x, this.at.y);
+    this.askProfile();
   }
 
   protected override updated(): void {
     this.askAgain();
     const { canvas } = this;
     const sharp = window.devicePixelRatio || 1;
-    const now = this.bench.picture?.bitmap;
-    const pinned = this.bench.pinned;
+    const { bench } = this;
+    const now = bench.frames?.bitmaps[Math.min(this.frame, bench.frames.bitmaps.length - 1)] ?? bench.picture?.bitmap;
+    const pinned = bench.pinned;
     const shows = [
       now, pinned, this.mode, this.wipe, this.width, this.height, sharp, ...this.shape, this.unit, this.middle.x, this.middle.y,
-      this.at?.x, this.at?.y, this.matchesFocus(),
+      this.at?.x, this.at?.y, this.matchesFocus(), this.line?.[0].x, this.line?.[0].y, this.line?.[1].x, this.line?.[1].y,
     ];
     if (shows.every((each, number) => each === this.drawn[number])) return;
     this.drawn = shows;
@@ -267,58 +327,27 @@ export class PictureView extends Part {
     context.clearRect(0, 0, wide, high);
     context.setTransform(sharp, 0, 0, sharp, 0, 0);
     if (!now || !this.width) return;
-    if (this.mode === "alone" || !pinned) this.put(context, now, 0, this.width);
-    else if (this.mode === "beside") {
-      this.put(context, pinned, 0, this.paneWidth - 1);
-      this.put(context, now, this.paneWidth, this.paneWidth);
-    } else if (this.mode === "wipe") {
-      const line = this.wipe * this.width;
-      this.put(context, pinned, 0, line, 0);
-      this.put(context, now, line, this.width - line, 0);
-      context.fillStyle = "rgb(0 0 0 / 50%)";
-      context.fillRect(line - 2, 0, 4, this.height);
-      context.fillStyle = "#fff";
-      context.fillRect(line - 1, 0, 2, this.height);
-      context.beginPath();
-      context.roundRect(line - 4, this.height / 2 - 16, 8, 32, 4);
-      context.fill();
-      context.strokeStyle = "rgb(0 0 0 / 50%)";
-      context.stroke();
-    } else this.put(context, this.difference(now, pinned), 0, this.width);
+    const { width, height, shape, unit, paneWidth, wipe } = this;
+    drawPictures(context, this.mode, now, pinned, { width, height, shape, unit, paneWidth, wipe, corner: this.corner(), moving: bench.picture?.about.moving ?? false });
+    if (this.line) this.drawLine(context, this.line);
     if (this.at && (this.unit >= OUTLINED || this.matchesFocus())) this.outline(context, this.at);
+  }
+
+  private drawLine(context: CanvasRenderingContext2D, ends: [Place, Place]): void {
+    const corner = this.corner();
+    const [from, to] = ends.map(({ x, y }) => [corner.x + (x + 0.5) * this.unit, corner.y + (y + 0.5) * this.unit] as const) as [readonly [number, number], readonly [number, number]];
+    for (const [width, style] of [[3, "rgb(0 0 0 / 60%)"], [1.5, "#fff"]] as const) {
+      context.lineWidth = width;
+      context.strokeStyle = style;
+      context.beginPath();
+      context.moveTo(...from);
+      context.lineTo(...to);
+      context.stroke();
+    }
   }
 
   private matchesFocus(): boolean {
     return this.canvas.matches(":focus-visible");
-  }
-
-  /** One picture within a piece of the canvas from `left` on; its origin there unless another is given. */
-  private put(context: CanvasRenderingContext2D, image: CanvasImageSource, left: number, width: number, origin = left): void {
-    const [rows, columns] = this.shape;
-    const corner = this.corner();
-    context.save();
-    context.beginPath();
-    context.rect(left, 0, width, this.height);
-    context.clip();
-    context.imageSmoothingEnabled = this.unit < 2;
-    context.imageSmoothingQuality = this.bench.picture?.about.moving ? "low" : "high";
-    context.drawImage(image, origin + corner.x, corner.y, columns * this.unit, rows * this.unit);
-    context.restore();
-  }
-
-  /** |one − other|, four times as bright: no difference is black. */
-  private difference(one: ImageBitmap, other: ImageBitmap): HTMLCanvasElement {
-    const { scratch } = this;
-    const [rows, columns] = this.shape;
-    [scratch.width, scratch.height] = [columns, rows];
-    const context = scratch.getContext("2d")!;
-    context.drawImage(one, 0, 0, columns, rows);
-    context.globalCompositeOperation = "difference";
-    context.drawImage(other, 0, 0, columns, rows);
-    context.globalCompositeOperation = "lighter";
-    for (let doubled = 0; doubled < 2; doubled++) context.drawImage(scratch, 0, 0);
-    context.globalCompositeOperation = "source-over";
-    return scratch;
   }
 
   private outline(context: CanvasRenderingContext2D, { x, y }: Place): void {
@@ -351,28 +380,60 @@ export class PictureView extends Part {
         <label class="check" title="Noise of the sensor's electronics"><input type="checkbox" .checked=${bench.document?.noise ?? false}
           @change=${(event: Event) => bench.set(["noise"], (event.target as HTMLInputElement).checked)}>Noise</label>
         <span class="spring"></span>
-        <button aria-pressed=${bench.pinned !== null} ?disabled=${!about} title="Keep this picture to compare others with" @click=${() => this.pin()}>${sign("pin")}${bench.pinned ? "Unpin" : "Pin"}</button>
+        <div class="group">
+          <button class="icon" aria-pressed=${this.levels} title="Histogram, black and white, channels" aria-label="Levels" @click=${() => (this.levels = !this.levels)}>${sign("bars")}</button>
+          <button class="icon" aria-pressed=${this.measures} title="Draw a line to read the image along it (p)" aria-label="Profile along a line" @click=${() => this.measure()}>${sign("line")}</button>
+          <button class="icon" title="Download as shown (PNG)" aria-label="Download as shown" ?disabled=${!about} @click=${() => this.saveAsShown()}>${sign("save")}</button>
+        </div>
+        <button ?disabled=${!about} title="Keep this state to compare others with" @click=${() => this.pin()}>${sign("pin")}Pin</button>
         ${bench.pinned ? html`<select aria-label="Compare with the pinned picture" .value=${this.compare}
           @change=${(event: Event) => (this.compare = (event.target as HTMLSelectElement).value as Compare)}>
           ${MODES.map(([mode, words]) => html`<option value=${mode} ?selected=${mode === this.compare}>${words}</option>`)}</select>` : nothing}
       </div>
       <div class="stage">
         <canvas ?data-aiming=${this.aiming} tabindex="0" role="application"
-          aria-label="The picture. Arrow keys move over its pixels, Enter focuses on one, plus, minus and 0 zoom."
+          aria-label="The picture. Arrow keys move over its pixels, Enter focuses on one, p begins a profile, plus, minus and 0 zoom."
           @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.up} @pointercancel=${this.up}
           @pointerleave=${() => this.point(null)} @dblclick=${() => this.zoomTo(this.zoom > 1 ? 1 : 8)}
           @focus=${() => this.requestUpdate()} @blur=${() => this.requestUpdate()} @keydown=${this.key}></canvas>
         ${this.bench.without ? html`<p class="without">${this.bench.without}</p>` : this.captions()}
+        ${this.levels ? html`<vcc-bench-levels class="panel" .bench=${bench}></vcc-bench-levels>` : nothing}
+        ${this.profile()}
+        ${bench.frames ? this.scrubbing() : nothing}
         ${this.mode === "wipe" ? html`<input type="range" class="wipe" min="0" max="1" step="0.01" aria-label="Place of the wipe" .value=${String(this.wipe)}
           @input=${(event: Event) => (this.wipe = Number((event.target as HTMLInputElement).value))}>` : nothing}
       </div>
+      ${bench.pins.length ? html`<vcc-bench-pins .bench=${bench}></vcc-bench-pins>` : nothing}
       <div class="line">${this.reading()}<span class="spring"></span>${this.state()}</div>`;
   }
 
   private pin(): void {
-    const on = !this.bench.pinned;
-    this.bench.pin(on);
-    if (on && this.compare === "alone") this.compare = "wipe";
+    this.bench.pin();
+    if (this.compare === "alone") this.compare = "wipe";
+  }
+
+  /** Irradiance along the line, once it is known. */
+  private profile() {
+    const answer = this.bench.answers.get("profile")?.message;
+    if (!this.measures) return nothing;
+    if (!this.line || answer?.what !== "profile") return html`<p class="panel right quiet">Draw a line over the picture.</p>`;
+    const names = answer.values.length === 3 ? ["red", "green", "blue"] : answer.values.map(() => "grey");
+    const most = Math.max(...answer.values.flat(), 1e-12);
+    const length = answer.places.at(-1) ?? 1;
+    const curves = answer.values.map((values, channel) => ({ name: names[channel]!, points: values.map((value, at): [number, number] => [answer.places[at]! * 1e3, value]) }));
+    return html`<div class="panel right plot">${plotted(curves, {
+      width: 300, height: 150, most: [length * 1e3, most], words: "mm along the line on the sensor", label: `Irradiance along a line of ${short(length, 4)}`,
+    })}</div>`;
+  }
+
+  /** A sweep, gone through by hand. */
+  private scrubbing() {
+    const { values, label } = this.bench.frames!;
+    const at = Math.min(this.frame, values.length - 1);
+    return html`<div class="scrub panel"><label>${label} ${values[at]}
+      <input type="range" min="0" max=${values.length - 1} .value=${String(at)} aria-label="Frame of the sweep" aria-valuetext="${label} ${values[at]}"
+        @input=${(event: Event) => (this.frame = Number((event.target as HTMLInputElement).value))}></label>
+      <button @click=${() => { this.frame = 0; this.bench.endScrub(); }}>Close</button></div>`;
   }
 
   private exposure() {
@@ -391,6 +452,9 @@ export class PictureView extends Part {
   private captions() {
     const psnr = this.bench.picture?.about.psnr;
     const words = this.bench.picture?.about.same ? "the same" : psnr === null || psnr === undefined ? "" : `PSNR ${plain(psnr, 3)} dB`;
+    const about = this.bench.picture?.about;
+    if (this.mode === "alone" && about?.look.photodiodes === "apart" && about.photodiodes[0] * about.photodiodes[1] > 1)
+      return html`<span class="caption left">${about.photodiodes[0]} × ${about.photodiodes[1]} photodiodes, in their order as seen from behind the sensor</span>`;
     if (this.mode === "alone") return nothing;
     if (this.mode === "difference") return html`<span class="caption left">difference ×4${words ? ` · ${words}` : ""}</span>`;
     return html`<span class="caption left">pinned</span><span class="caption right">now${words ? ` · ${words}` : ""}</span>`;
@@ -402,7 +466,8 @@ export class PictureView extends Part {
     const same = value && value.x === this.at.x && value.y === this.at.y;
     const numbers = same ? value.irradiance.map((each) => plain(each, 4)).join("  ") : "…";
     const recorded = same && value.recorded ? ` · DN ${value.recorded.map((each) => plain(each, 6)).join("  ")}` : "";
-    return html`<span role="status">column ${this.at.x}, row ${this.at.y} · ${numbers}${recorded}</span>`;
+    const place = same ? ` · x ${short(value.place[0], 4)}, y ${short(value.place[1], 4)}` : "";
+    return html`<span role="status">column ${this.at.x}, row ${this.at.y}${place} · ${numbers}${recorded}</span>`;
   }
 
   private state() {
@@ -415,6 +480,7 @@ export class PictureView extends Part {
 
   static override styles = [
     controls,
+    answerStyles,
     css`
       :host { display: flex; flex-direction: column; min-height: 0; min-width: 0; container-type: inline-size; }
       .short { display: none; }
@@ -422,11 +488,19 @@ export class PictureView extends Part {
       .group { display: flex; align-items: center; gap: 2px; }
       .group + label.check { margin-left: 6px; }
       .spring { flex: 1; }
+      .bar select { flex: none; width: auto; }
       .stage { position: relative; flex: 1; min-height: 0; background: var(--stage); overflow: hidden; }
       canvas { position: absolute; inset: 0; width: 100%; height: 100%; touch-action: none; cursor: crosshair; }
       canvas[data-aiming] { cursor: cell; }
       canvas:focus-visible { outline-offset: -2px; }
       .without { position: absolute; left: 10%; right: 10%; top: 40%; margin: 0; padding: 12px 16px; border-radius: 8px; background: var(--error-ground); white-space: pre-line; overflow-wrap: anywhere; }
+      .panel { position: absolute; left: 8px; bottom: 8px; margin: 0; border-radius: 8px; border: 1px solid var(--line); background: color-mix(in srgb, var(--ground) 92%, transparent); box-shadow: 0 4px 16px rgb(0 0 0 / 18%); z-index: 1; }
+      .panel.right { left: auto; right: 8px; }
+      p.panel { padding: 6px 10px; }
+      .plot { width: min(316px, 80%); padding: 4px 8px; }
+      .scrub { left: 8px; right: 8px; display: flex; align-items: center; gap: 8px; padding: 6px 10px; }
+      .scrub label { flex: 1; display: flex; align-items: center; gap: 10px; white-space: nowrap; }
+      .scrub input { flex: 1; accent-color: var(--accent); min-width: 60px; }
       .caption { position: absolute; top: 8px; padding: 2px 8px; border-radius: 4px; background: rgb(0 0 0 / 62%); color: #fff; font-size: 12px; pointer-events: none; }
       .caption.left { left: 8px; } .caption.right { right: 8px; }
       /* The line itself is dragged; the slider is there for keys, and seen when they are on it. */
@@ -436,7 +510,8 @@ export class PictureView extends Part {
       .line { display: flex; gap: 14px; min-height: 26px; align-items: center; padding: 0 10px; font-size: 12px; color: var(--quiet); white-space: nowrap; overflow: hidden; }
       .line > span { overflow: hidden; text-overflow: ellipsis; white-space: pre; }
       .line > .missing { color: var(--warn-ink); }
-      @container (max-width: 540px) { .short { display: inline; } .long { display: none; } .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
+      @container (max-width: 740px) { .short { display: inline; } .long { display: none; } }
+      @container (max-width: 540px) { .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
     `,
   ];
 }

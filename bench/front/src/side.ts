@@ -1,25 +1,34 @@
-/** The bench from the side: the axis, its elements and the sensor, rays, distances; all of it can be moved along the axis. */
+/** The bench from the side: its parts are moved, changed by handles, and looked at closely. */
 
 import { html, svg, css, nothing } from "lit";
 
 import type { Selected } from "./bench";
+import { Frame, MARGIN, type Mapping } from "./frame";
+import { asValue, drawnHandle, handlesOf, inWords, placeOf, valueAt, type Held } from "./handles";
+import { drawnDistances, drawnLabels } from "./labels";
 import { axisStep, inMillimetres, short } from "./numbers";
 import { Part, controls } from "./part";
-import type { Rays, Side, Snap } from "./protocol";
+import type { Handle, Side, Snap, Where } from "./protocol";
+import { drawnRays, legend } from "./rays";
 import { drawn, drawnAperture, drawnSensor, type Scale } from "./shapes";
+import { sign } from "./signs";
 
-const MARGIN = { left: 14, right: 30, top: 46, bottom: 40 };
 /** Within so many pixels of a place that is sharp, what is dragged is pulled to it, and within so many the place is shown. */
 const PULL = 7;
 const NEAR = 60;
 const REACH = 18;
-/** A longer drawing than needed is kept up to this ratio, so that it does not jump with every small move. */
-const LOOSE = 1.35;
-/** Behind the sensor, as a share of the drawing: there is room to drag it to. */
-const ROOM = 0.06;
+const HANDLE = 10;
+const WHEEL = 0.0022;
 /** In a wider drawing all rays are named, in a narrower one those of the axis. */
 const ALL_RAYS = 500;
 const KEY_PAUSE = 500;
+/** A part that is dragged so close to the border of the drawing, pixels, takes the border with it. */
+const EDGE = 8;
+/** Of the magnifier, pixels; what is closer than this to the sensor or to where rays meet is shown in it. */
+const LENS = { width: 156, height: 88 };
+const CLOSE = 26;
+/** In a narrower drawing it would cover the rays. */
+const NARROW = 460;
 
 interface Drag {
   which: Selected;
@@ -33,32 +42,18 @@ interface Drag {
   moved: boolean;
 }
 
-interface Frame {
-  start: number;
-  end: number;
-  half: number;
-}
-
-const pencil = document.createElement("canvas").getContext("2d")!;
-
-/** Of words in the drawing's type, pixels. */
-function wide(words: string, bold = false): number {
-  pencil.font = `${bold ? 600 : 400} 11.5px system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", sans-serif`;
-  return pencil.measureText(words).width;
-}
-
-/** What a fan of rays is called where there is little room: "in focus: 1.3 m", "off the axis". */
-function brief({ colour, words }: Rays): string {
-  return colour === "off axis" ? "off the axis" : words.replace(/ away$/, "");
-}
-
 export class SideView extends Part {
-  static override properties = { ...Part.properties, width: { state: true }, height: { state: true }, drag: { state: true }, hover: { state: true } };
+  static override properties = { ...Part.properties, width: { state: true }, height: { state: true }, drag: { state: true }, held: { state: true }, hover: { state: true }, magnifies: { state: true } };
   declare width: number;
   declare height: number;
   declare drag: Drag | null;
+  /** The handle that is dragged. */
+  declare held: Held | null;
   declare hover: Selected | null;
-  private frame: Frame | null = null;
+  declare magnifies: boolean;
+  private readonly frame = new Frame();
+  private readonly pointers = new Map<number, { x: number; y: number }>();
+  private panning = false;
   private keyTimer = 0;
   private readonly watch = new ResizeObserver(([entry]) => {
     this.width = Math.round(entry!.contentRect.width);
@@ -68,24 +63,28 @@ export class SideView extends Part {
   constructor() {
     super();
     this.width = this.height = 0;
-    this.drag = this.hover = null;
+    this.drag = this.held = this.hover = null;
+    this.magnifies = true;
   }
 
   override connectedCallback(): void {
     super.connectedCallback();
     this.watch.observe(this);
+    // Lit's listeners are passive in some browsers; two fingers zoom the drawing and not the page.
+    this.addEventListener("wheel", this.wheel, { passive: false });
+    this.addEventListener("touchstart", this.twoFingers, { passive: false });
   }
 
   override disconnectedCallback(): void {
     super.disconnectedCallback();
     this.watch.disconnect();
+    this.removeEventListener("wheel", this.wheel);
+    this.removeEventListener("touchstart", this.twoFingers);
   }
 
-  // --- where things are ---
-
-  private placeOf(which: Selected): number {
-    if (this.drag?.which === which) return this.drag.z;
-    return this.bench.partOf(which)?.z ?? 0;
+  protected override watched() {
+    const { side, document, open, selected, notes } = this.bench;
+    return [side, document, open, selected, notes];
   }
 
   private parts(): (number | "sensor")[] {
@@ -97,100 +96,167 @@ export class SideView extends Part {
     return typeof which === "number" ? (this.bench.side?.elements[which]?.length ?? 0) : 0;
   }
 
-  /** What is drawn, metres. It stays while something is dragged, and grows or shrinks only where it must. */
-  private framed(side: Side): Frame {
-    const wanted = { start: side.from, end: side.to + ROOM * (side.to - side.from), half: side.half };
-    const old = this.frame;
-    if (old && this.drag) return old;
-    if (
-      old && wanted.start >= old.start && wanted.end <= old.end && wanted.half <= old.half &&
-      (wanted.end - wanted.start) * LOOSE > old.end - old.start && wanted.half * LOOSE > old.half
-    )
-      return old;
-    this.frame = wanted;
-    return wanted;
+  private mapping(): Mapping {
+    this.frame.follow(this.bench.side!, this.drag !== null || this.held !== null);
+    return this.frame.mapping(this.width, this.height);
   }
 
-  private scale(side: Side): Scale & { z(x: number): number } {
-    const { start, end, half } = this.framed(side);
-    const across = (this.width - MARGIN.left - MARGIN.right) / (end - start);
-    const middle = (MARGIN.top + this.height - MARGIN.bottom) / 2;
-    const up = (this.height - MARGIN.top - MARGIN.bottom) / 2 / half;
-    return {
-      x: (z) => MARGIN.left + (z - start) * across,
-      z: (x) => start + (x - MARGIN.left) / across,
-      y: (height) => middle - height * up,
-      top: MARGIN.top,
-      bottom: this.height - MARGIN.bottom,
-      thick: Math.min(Math.max(0.016 * (end - start) * across, 4), 11),
-    };
+  // --- zoom and pan ---
+
+  private readonly wheel = (event: WheelEvent) => {
+    if (!this.bench.side) return;
+    event.preventDefault();
+    const { x, y } = this.pointOf(event);
+    this.zoom(Math.exp(-event.deltaY * WHEEL * (event.deltaMode === 1 ? 20 : 1)), x, y);
+  };
+
+  private readonly twoFingers = (event: TouchEvent) => {
+    if (event.touches.length > 1) event.preventDefault();
+  };
+
+  private zoom(factor: number, x?: number, y?: number): void {
+    this.mapping();
+    this.frame.zoomTo(this.frame.zoom * factor, this.width, this.height, x, y);
+    this.requestUpdate();
   }
 
-  // --- moving things ---
+  private fit(): void {
+    this.zoom(0);
+  }
 
-  private nearest(event: PointerEvent): { which: Selected; x: number } | null {
-    const side = this.bench.side;
-    if (!side) return null;
-    const scale = this.scale(side);
+  // --- pointers ---
+
+  private pointOf(event: MouseEvent): { x: number; y: number } {
     const box = this.getBoundingClientRect();
-    const x = event.clientX - box.left;
+    return { x: event.clientX - box.left, y: event.clientY - box.top };
+  }
+
+  /** All parts at a place, the nearest first. */
+  private partsAt(event: PointerEvent, { x, y }: { x: number; y: number }): Selected[] {
+    const side = this.bench.side;
+    if (!side) return [];
+    const scale = this.mapping();
     // The light field's aperture often stands where a lens does: it is taken by its handle below.
-    const below = event.clientY - box.top > scale.bottom - 4;
-    if (below && side.aperture && Math.abs(scale.x(this.placeOf("light field")) - x) < REACH) return { which: "light field", x };
-    let found: Selected | null = null;
-    let least = event.pointerType === "mouse" ? REACH : 1.6 * REACH;
-    for (const which of this.parts()) {
-      const from = scale.x(this.placeOf(which));
-      const to = scale.x(this.placeOf(which) + this.lengthOf(which));
-      const away = x < from ? from - x : x > to ? x - to : 0;
-      // Of two in one place, the one that is selected.
-      if (away < least || (away === least && which === this.bench.selected)) [found, least] = [which, away];
+    const below = y > scale.bottom - 4;
+    if (below && side.aperture && Math.abs(scale.x(this.bench.placeOf("light field")) - x) < REACH) return ["light field"];
+    const least = event.pointerType === "mouse" ? REACH : 1.6 * REACH;
+    return this.parts()
+      .map((which) => {
+        const from = scale.x(this.bench.placeOf(which));
+        const to = scale.x(this.bench.placeOf(which) + this.lengthOf(which));
+        return { which, away: x < from ? from - x : x > to ? x - to : 0 };
+      })
+      .filter(({ away }) => away < least)
+      .sort((one, other) => one.away - other.away || Number(other.which === this.bench.selected) - Number(one.which === this.bench.selected))
+      .map(({ which }) => which);
+  }
+
+  private handleAt(event: PointerEvent, { x, y }: { x: number; y: number }): Handle | null {
+    const scale = this.mapping();
+    let [found, least]: [Handle | null, number] = [null, event.pointerType === "mouse" ? HANDLE : 2 * HANDLE];
+    for (const handle of handlesOf(this.bench)) {
+      const place = placeOf(this.bench, handle, scale);
+      const away = Math.hypot(place.x - x, place.y - y);
+      if (away < least) [found, least] = [handle, away];
     }
-    return found === null ? null : { which: found, x };
+    return found;
   }
 
   private down(event: PointerEvent): void {
-    const found = this.nearest(event);
-    if (!found || event.button !== 0) return;
-    this.bench.select(found.which);
-    const z = this.placeOf(found.which);
-    this.drag = { which: found.which, grip: found.x - this.scale(this.bench.side!).x(z), from: z, z, snaps: this.snapsOf(found.which), snap: null, moved: false };
+    if (event.button !== 0 || !this.bench.side) return;
+    const point = this.pointOf(event);
+    this.pointers.set(event.pointerId, point);
     (event.currentTarget as Element).setPointerCapture(event.pointerId);
-    this.renderRoot.querySelector<SVGElement>(`[data-part="${found.which}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
-    event.preventDefault();
-  }
-
-  private move(event: PointerEvent): void {
-    if (!this.drag) {
-      this.hover = this.nearest(event)?.which ?? null;
+    if (this.pointers.size > 1) {
+      this.up();
       return;
     }
-    const scale = this.scale(this.bench.side!);
-    const step = axisStep(this.frame!.end - this.frame!.start) / 10;
-    const x = event.clientX - this.getBoundingClientRect().left - this.drag.grip;
+    const handle = this.handleAt(event, point);
+    if (handle) {
+      this.held = { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value: handle.value, ...point, moved: false };
+      event.preventDefault();
+      return;
+    }
+    const which = this.partsAt(event, point)[0];
+    if (which === undefined) {
+      this.panning = true;
+      return;
+    }
+    const z = this.bench.placeOf(which);
+    this.drag = { which, grip: point.x - this.mapping().x(z), from: z, z, snaps: this.snapsOf(which), snap: null, moved: false };
+    const again = this.bench.selected === which;
+    this.bench.select(which);
+    this.renderRoot.querySelector<SVGElement>(`[data-part="${which}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
+    this.drag.moved = false;
+    this.again = again;
+    event.preventDefault();
+  }
+  /** Whether what is pressed on was selected before: a click then selects the next part in the same place. */
+  private again = false;
+
+  private move(event: PointerEvent): void {
+    const point = this.pointOf(event);
+    const before = this.pointers.get(event.pointerId);
+    if (!before) {
+      this.hover = this.partsAt(event, point)[0] ?? null;
+      this.classList.toggle("over-handle", this.bench.side !== null && this.handleAt(event, point) !== null);
+      return;
+    }
+    if (this.pointers.size === 2) {
+      const other = [...this.pointers].find(([id]) => id !== event.pointerId)![1];
+      const apart = (one: { x: number; y: number }) => Math.max(Math.hypot(one.x - other.x, one.y - other.y), 1);
+      this.frame.pan((point.x - before.x) / 2, (point.y - before.y) / 2, this.width, this.height);
+      this.zoom(apart(point) / apart(before), (point.x + other.x) / 2, (point.y + other.y) / 2);
+    } else if (this.held) this.moveHandle(this.held, point);
+    else if (this.drag) this.movePart(this.drag, point, event.altKey);
+    else if (this.panning && this.frame.zoom > 1) {
+      this.frame.pan(point.x - before.x, point.y - before.y, this.width, this.height);
+      this.requestUpdate();
+    }
+    this.pointers.set(event.pointerId, point);
+  }
+
+  private moveHandle(held: Held, point: { x: number; y: number }): void {
+    if (!held.moved && Math.hypot(point.x - held.x, point.y - held.y) < 2) return;
+    const { value, words } = valueAt(held, point.x, point.y, this.mapping());
+    this.held = { ...held, value, moved: true };
+    this.bench.set(held.where, words, true);
+  }
+
+  private movePart(drag: Drag, point: { x: number; y: number }, free: boolean): void {
+    const scale = this.mapping();
+    const step = axisStep(this.frame.length / this.frame.zoom) / 10;
+    const x = point.x - drag.grip;
     let z = Math.round(scale.z(x) / step) * step;
-    const snap = event.altKey ? null : this.snapNear(this.drag.snaps, x, scale);
+    const snap = free ? null : this.snapNear(drag.snaps, x, scale);
     if (snap && Math.abs(scale.x(snap.z) - x) < PULL) z = snap.z;
-    if (z === this.drag.z && this.drag.moved) return;
-    if (!this.drag.moved && Math.abs(scale.x(z) - scale.x(this.drag.from)) < 2) return;
-    this.drag = { ...this.drag, z, snap, moved: true };
-    this.bench.set([...this.bench.whereOf(this.drag.which), "z"], inMillimetres(z), true);
+    if (z === drag.z && drag.moved) return;
+    if (!drag.moved && Math.abs(scale.x(z) - scale.x(drag.from)) < 2) return;
+    this.drag = { ...drag, z, snap, moved: true };
+    this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(z), true);
+    // Only at the very border: a drawing whose scale changed under the hand would run away.
+    if (point.x < EDGE || point.x > this.width - EDGE) this.frame.reach(z, this.width, this.height);
+  }
+
+  private lift(event: PointerEvent): void {
+    const { drag, again } = this;
+    const point = this.pointOf(event);
+    this.pointers.delete(event.pointerId);
+    if (drag && !drag.moved && again) {
+      const here = this.partsAt(event, point);
+      const scale = this.mapping();
+      const same = here.filter((which) => Math.abs(scale.x(this.bench.placeOf(which)) - scale.x(drag.z)) < 2);
+      if (same.length > 1) this.bench.select(same[(same.indexOf(drag.which) + 1) % same.length]!);
+    }
+    this.up();
   }
 
   private up(): void {
-    const drag = this.drag;
-    if (!drag) return;
-    if (drag.moved) this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(drag.z));
-    // The part stays where the hand left it until the host has said so, too.
-    const there = () => Math.abs((this.bench.partOf(drag.which)?.z ?? NaN) - drag.z) < 1e-9;
-    const settled = () => {
-      this.bench.removeEventListener("change", heard);
-      if (this.drag === drag) this.drag = null;
-    };
-    const heard = () => void (there() && settled());
-    this.bench.addEventListener("change", heard);
-    if (!drag.moved || there()) settled();
-    else window.setTimeout(settled, 400);
+    const { drag, held } = this;
+    this.panning = false;
+    this.drag = this.held = null;
+    if (drag?.moved) this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(drag.z));
+    if (held?.moved) this.bench.set(held.where, asValue(held.handle, held.value).words);
   }
 
   private snapsOf(which: Selected): Snap[] {
@@ -205,17 +271,19 @@ export class SideView extends Part {
     return found;
   }
 
-  private key(event: KeyboardEvent, which: Selected): void {
+  // --- keys ---
+
+  private keyOfPart(event: KeyboardEvent, which: Selected): void {
     const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
     if (by && !event.ctrlKey && !event.metaKey) {
       event.preventDefault();
-      const step = axisStep(this.frame!.end - this.frame!.start) * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1);
-      const z = (this.drag?.which === which ? this.drag.z : this.placeOf(which)) + by * step;
-      const from = this.drag?.from ?? this.placeOf(which);
+      const step = axisStep(this.frame.length / this.frame.zoom) * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1);
+      const z = this.bench.placeOf(which) + by * step;
+      const from = this.drag?.from ?? this.bench.placeOf(which);
       this.drag = { which, grip: 0, from, z: Math.round(z / (step / 10)) * (step / 10), snaps: [], snap: null, moved: true };
       this.bench.set([...this.bench.whereOf(which), "z"], inMillimetres(this.drag.z), true);
-      window.clearTimeout(this.keyTimer);
-      this.keyTimer = window.setTimeout(() => this.keysDone(), KEY_PAUSE);
+      this.frame.reach(this.drag.z, this.width, this.height);
+      this.waitForKeys();
     } else if (event.key === "Enter") {
       this.dispatchEvent(new CustomEvent("type-place", { bubbles: true, composed: true }));
       event.preventDefault();
@@ -223,16 +291,44 @@ export class SideView extends Part {
       this.bench.act({ do: "remove", element: which });
       event.preventDefault();
     } else if (event.key === "Escape" && this.drag) {
-      const { from } = this.drag;
-      this.drag = { ...this.drag, z: from };
+      this.drag = { ...this.drag, z: this.drag.from };
       this.keysDone();
     }
+  }
+
+  private keyOfHandle(event: KeyboardEvent, handle: Handle): void {
+    const by = { ArrowRight: 1, ArrowUp: 1, ArrowLeft: -1, ArrowDown: -1 }[event.key];
+    if (!by || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const size = handle.words === "decentre" ? axisStep(this.frame.length) : handle.unit === "angle" ? Math.PI / 180 : 0.02 * Math.abs(handle.value);
+    const from = this.held?.handle.words === handle.words ? this.held.value : handle.value;
+    const { value, words } = asValue(handle, from + by * size * (event.shiftKey ? 5 : event.altKey ? 0.2 : 1));
+    this.held = { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value, x: 0, y: 0, moved: true };
+    this.bench.set(this.held.where, words, true);
+    this.waitForKeys();
+  }
+
+  private waitForKeys(): void {
+    window.clearTimeout(this.keyTimer);
+    this.keyTimer = window.setTimeout(() => this.keysDone(), KEY_PAUSE);
   }
 
   /** Keys that follow one another are one movement; it ends when none came for a while, or the part is left. */
   private keysDone(): void {
     window.clearTimeout(this.keyTimer);
-    if (this.drag) this.up();
+    if (this.pointers.size === 0) this.up();
+  }
+
+  private keyOfDrawing(event: KeyboardEvent): void {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const x = this.mapping().x(this.bench.placeOf(this.bench.selected));
+    const y = (MARGIN.top + this.height - MARGIN.bottom) / 2;
+    if (event.key === "+" || event.key === "=") this.zoom(1.5, x, y);
+    else if (event.key === "-") this.zoom(1 / 1.5, x, y);
+    else if (event.key === "0") this.fit();
+    else return;
+    event.preventDefault();
   }
 
   // --- drawing ---
@@ -240,44 +336,83 @@ export class SideView extends Part {
   override render() {
     const side = this.bench.side;
     if (!side || !this.width || !this.height) return nothing;
-    const scale = this.scale(side);
-    const cursor = this.drag || this.hover !== null ? "grab" : "";
+    const scale = this.mapping();
+    const cursor = this.drag || this.hover !== null ? "grab" : this.frame.zoom > 1 ? "pan" : "";
     return html`
-      <svg width=${this.width} height=${this.height} class=${cursor} role="group" aria-label="The camera from the side"
-        @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.up} @pointercancel=${this.up}
-        @pointerleave=${() => (this.hover = null)}>
-        <path class="axis" d="M0 ${scale.y(0)}H${this.width}"></path>
-        ${this.drawAperture(side, scale)}
-        ${this.parts().map((which) => this.drawBack(which, scale))}
-        ${this.parts().map((which) => this.drawPart(which, side, scale))}
-        <g class="rays">${side.rays.map((each) => this.drawRays(each, scale))}</g>
-        ${this.drawSnap(scale)}
-        ${this.drawLabels(side, scale)}
-        ${this.drawDistances(side, scale)}
+      <svg width=${this.width} height=${this.height} class="${cursor} ${this.bench.open ? "" : "stale"}" role="group" aria-label="The camera from the side"
+        style="touch-action:${this.width > ALL_RAYS || this.frame.zoom > 1 ? "none" : "pan-y"}"
+        @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.lift} @pointercancel=${this.lift}
+        @pointerleave=${() => (this.hover = null)} @keydown=${this.keyOfDrawing}
+        @dblclick=${(event: MouseEvent) => this.hover === null && (this.frame.zoom > 1 ? this.fit() : this.zoom(6, ...this.at(event)))}>
+        <clipPath id="stage"><rect x="0" y=${scale.top - 8} width=${this.width} height=${scale.bottom - scale.top + 24}></rect></clipPath>
+        <g clip-path="url(#stage)">${this.drawParts(side, scale)}
+          ${this.drawSnap(scale)}
+          ${handlesOf(this.bench).map((handle) => this.drawHandle(handle, scale))}</g>
+        ${drawnLabels(this.bench, this.bench.selected === "light field" && side.aperture ? ["light field", ...this.parts()] : this.parts(), scale, this.width, (...given) => this.drawBadge(...given))}
+        ${drawnDistances(this.parts().map((which) => this.bench.placeOf(which)), scale, this.height, side.start < 0)}
+        ${this.magnifies ? this.drawMagnifier(side, scale) : nothing}
       </svg>
-      <ul class="legend">
-        ${side.rays.filter((each) => this.width > ALL_RAYS || each.colour !== "off axis").map((each) => html`<li><i class="ray ${each.colour.replace(" ", "-")}"></i>${brief(each)}</li>`)}
-      </ul>`;
+      ${legend(side.rays, this.width > ALL_RAYS)}
+      <div class="tools" role="toolbar" aria-label="Drawing">
+        <button class="icon" title="Zoom out (−)" aria-label="Zoom the drawing out" ?disabled=${this.frame.zoom <= 1} @click=${() => this.zoom(1 / 1.5)}>${sign("minus")}</button>
+        <button class="icon" title="Zoom in (+, wheel, pinch)" aria-label="Zoom the drawing in" @click=${() => this.zoom(1.5, scale.x(this.bench.placeOf(this.bench.selected)), scale.y(0))}>${sign("plus")}</button>
+        <button class="icon" title="All of it (0)" aria-label="The whole drawing" ?disabled=${this.frame.zoom <= 1} @click=${() => this.fit()}>${sign("whole")}</button>
+        <button class="icon" title="Magnifier near the sensor" aria-label="Magnifier" aria-pressed=${this.magnifies} @click=${() => (this.magnifies = !this.magnifies)}>${sign("lens")}</button>
+        <button class="axis" title="Which direction points upwards: x, to the right in the scene, or y" aria-label="Upwards: ${side.axis}" @click=${() => this.bench.show({ axis: side.axis === "x" ? "y" : "x" })}>${side.axis}<span aria-hidden="true">↑</span></button>
+      </div>`;
   }
 
-  private drawRays(rays: Rays, scale: Scale) {
-    const lines = new Map<number, string[]>();
-    const ends: [number, number][] = [];
-    const last = Math.max(...rays.paths.map((path) => path[path.length - 1]?.[0] ?? -Infinity));
-    for (const path of rays.paths) {
-      for (let at = 1; at < path.length; at++) {
-        const [[fromZ, fromY], [z, y, share]] = [path[at - 1]!, path[at]!];
-        const tone = Math.ceil(share * 5) / 5;
-        if (!lines.has(tone)) lines.set(tone, []);
-        lines.get(tone)!.push(`M${scale.x(fromZ).toFixed(1)} ${scale.y(fromY).toFixed(1)}L${scale.x(z).toFixed(1)} ${scale.y(y).toFixed(1)}`);
-      }
-      const [z, y] = path[path.length - 1] ?? [last, 0];
-      if (z < last - 1e-9) ends.push([scale.x(z), scale.y(y)]);
-    }
-    return svg`<g class="ray ${rays.colour.replace(" ", "-")}">
-      ${[...lines].map(([tone, pieces]) => svg`<path d=${pieces.join("")} stroke-opacity=${0.25 + 0.6 * tone}></path>`)}
-      ${ends.map(([x, y]) => svg`<circle cx=${x} cy=${y} r="2"></circle>`)}
-    </g>`;
+  private at(event: MouseEvent): [number, number] {
+    const { x, y } = this.pointOf(event);
+    return [x, y];
+  }
+
+  private drawParts(side: Side, scale: Scale) {
+    return svg`<path class="axis" d="M0 ${scale.y(0)}H${this.width}"></path>
+      ${this.drawAperture(side, scale)}
+      ${this.parts().map((which) => this.drawBack(which, scale))}
+      ${this.parts().map((which) => this.drawPart(which, side, scale))}
+      <g class="rays">${side.rays.map((each) => drawnRays(each, scale))}</g>`;
+  }
+
+  /** What stands close to the sensor, and where rays meet, enlarged; nothing where the drawing shows it already. */
+  private drawMagnifier(side: Side, scale: Mapping) {
+    if (this.frame.zoom > 1 || this.width < NARROW || this.drag?.which === "light field") return nothing;
+    const sensor = this.bench.placeOf("sensor");
+    const near = this.parts().map((which) => this.bench.placeOf(which) + this.lengthOf(which));
+    const every = [...near, ...side.rays.flatMap((each) => (each.meet ? [each.meet[0]] : []))].filter((z) => Math.abs(scale.x(z) - scale.x(sensor)) < CLOSE);
+    const [low, high] = [Math.min(sensor, ...every), Math.max(sensor, ...every)];
+    const shown = Math.max(high - low, 1e-6);
+    if (scale.x(high) - scale.x(low) < 1) return nothing;
+    const times = Math.min((LENS.width - 60) / (scale.x(low + shown) - scale.x(low)), 60);
+    if (times < 2) return nothing;
+    const [x0, y0] = [Math.max(scale.x(sensor) - LENS.width - 22, 30), scale.top - 4];
+    const middle = (low + high) / 2;
+    const inside: Scale = {
+      x: (z) => x0 + LENS.width / 2 + (scale.x(z) - scale.x(middle)) * times,
+      y: (height) => y0 + LENS.height / 2 + (scale.y(height) - scale.y(0)) * times,
+      top: y0, bottom: y0 + LENS.height, thick: 9,
+    };
+    const [left, right] = [scale.x(middle) - LENS.width / 2 / times, scale.x(middle) + LENS.width / 2 / times];
+    return svg`<g class="magnifier" aria-hidden="true">
+      <clipPath id="lens"><rect x=${x0} y=${y0} width=${LENS.width} height=${LENS.height} rx="8"></rect></clipPath>
+      <path class="leads" d="M${left} ${scale.y(0)}L${x0 + LENS.width - 12} ${y0 + LENS.height}M${right} ${scale.y(0)}L${x0 + LENS.width} ${y0 + LENS.height - 8}"></path>
+      <rect class="ground" x=${x0} y=${y0} width=${LENS.width} height=${LENS.height} rx="8"></rect>
+      <g clip-path="url(#lens)"><path class="axis" d="M${x0} ${inside.y(0)}h${LENS.width}"></path>
+        ${this.parts().map((which) => (which === "sensor" ? drawnSensor(side.sensor, sensor, inside) : drawn(side.elements[which]!, this.bench.placeOf(which), inside)))}
+        <g class="rays">${side.rays.map((each) => drawnRays(each, inside))}</g></g>
+      <rect class="edge" x=${x0} y=${y0} width=${LENS.width} height=${LENS.height} rx="8"></rect>
+      <text x=${x0 + 6} y=${y0 + LENS.height - 6}>${times < 10 ? times.toFixed(1) : Math.round(times)}×</text></g>`;
+  }
+
+  private drawHandle(handle: Handle, scale: Mapping) {
+    const { x, y } = placeOf(this.bench, handle, scale);
+    const active = this.held?.handle.words === handle.words;
+    const label = this.bench.partOf(this.bench.selected)?.label[0] ?? "";
+    const now = this.held && active ? { ...handle, value: this.held.value } : handle;
+    return svg`<g class="knob ${active ? "active" : ""}" data-handle=${handle.words} tabindex="0" role="slider" aria-label="${handle.words} of ${label}"
+        aria-valuenow=${now.value} aria-valuetext=${inWords(now)} @keydown=${(event: KeyboardEvent) => this.keyOfHandle(event, handle)} @blur=${() => this.keysDone()}>
+      ${drawnHandle(now, x, y, active)}</g>`;
   }
 
   private drawSnap(scale: Scale) {
@@ -288,13 +423,13 @@ export class SideView extends Part {
     const left = x > this.width - 110;
     return svg`<g class="snap ${held ? "held" : ""}">
       <path d="M${x} ${scale.top - 6}V${scale.bottom + 4}"></path>
-      <text x=${x + (left ? -16 : 16)} y=${scale.bottom - 6} text-anchor=${left ? "end" : "start"}>${snap.words}</text>
+      <text x=${x + (left ? -16 : 16)} y=${scale.top + 12} text-anchor=${left ? "end" : "start"}>${snap.words}</text>
     </g>`;
   }
 
   /** The strip of the drawing by which a part is taken. */
   private strip(which: Selected, scale: Scale) {
-    const z = this.placeOf(which);
+    const z = this.bench.placeOf(which);
     const length = which === "sensor" ? 1.1 * scale.thick : scale.x(z + this.lengthOf(which)) - scale.x(z);
     const spare = length > 0 ? 6 : 9;
     return { x: scale.x(z) - spare, y: scale.top - 4, width: length + 2 * spare, height: scale.bottom - scale.top + 8 };
@@ -309,18 +444,18 @@ export class SideView extends Part {
   }
 
   private drawPart(which: number | "sensor", side: Side, scale: Scale) {
-    const z = this.placeOf(which);
+    const z = this.bench.placeOf(which);
     const { x, y, width, height } = this.strip(which, scale);
     return this.slider(which, svg`<rect class="strip" x=${x} y=${y} width=${width} height=${height} rx="5"></rect>
-      ${which === "sensor" ? drawnSensor(side.sensor, z, scale) : drawn({ ...side.elements[which]!, z }, z, scale)}`);
+      ${which === "sensor" ? drawnSensor(side.sensor, z, scale) : drawn(side.elements[which]!, z, scale)}`);
   }
 
   /** Where the views of the light field stand, and a handle by which they are moved. */
   private drawAperture(side: Side, scale: Scale) {
     if (!side.aperture) return nothing;
-    const z = this.placeOf("light field");
-    if (z < this.frame!.start || z > this.frame!.end) return nothing;
+    const z = this.bench.placeOf("light field");
     const x = scale.x(z);
+    if (x < 0 || x > this.width) return nothing;
     const state = this.bench.selected === "light field" ? "selected" : this.hover === "light field" ? "hover" : "";
     return this.slider("light field", svg`<g class="aperture ${state}">${drawnAperture(side.aperture, x, scale)}
       <path class="handle" d="M${x} ${scale.bottom + 1}l6 9h-12z"></path>
@@ -329,43 +464,14 @@ export class SideView extends Part {
 
   /** What can be moved along the axis by keys. */
   private slider(which: Selected, inside: unknown) {
-    const z = this.placeOf(which);
-    const reach = (this.frame!.end - this.frame!.start) * 1e3;
+    const z = this.bench.placeOf(which);
+    const { start } = this.frame.range!;
     return svg`<g class="part" data-part=${which} tabindex="0" role="slider"
         aria-label="${this.bench.partOf(which)!.label.join(", ")}: place on the axis" aria-orientation="horizontal"
-        aria-valuemin=${(this.frame!.start * 1e3).toFixed(1)} aria-valuemax=${(this.frame!.start * 1e3 + 2 * reach).toFixed(1)}
+        aria-valuemin=${(start * 1e3).toFixed(1)} aria-valuemax=${((start + 2 * this.frame.length) * 1e3).toFixed(1)}
         aria-valuenow=${(z * 1e3).toFixed(3)} aria-valuetext=${short(z, 6)}
-        @keydown=${(event: KeyboardEvent) => this.key(event, which)}
+        @keydown=${(event: KeyboardEvent) => this.keyOfPart(event, which)}
         @focus=${() => this.bench.select(which)} @blur=${() => this.keysDone()}>${inside}</g>`;
-  }
-
-  /** Names above, in two lines where they would meet; what is selected says its place. */
-  private drawLabels(side: Side, scale: Scale) {
-    const named: Selected[] = this.bench.selected === "light field" && side.aperture ? ["light field", ...this.parts()] : this.parts();
-    const labels = named
-      .map((which) => {
-        const part = this.bench.partOf(which)!;
-        const length = this.lengthOf(which);
-        const z = this.placeOf(which);
-        const chosen = this.bench.selected === which;
-        const name = part.label[0] ?? "";
-        const words = chosen ? `${name} · ${short(z, 6)}` : name;
-        return { which, x: scale.x(z + length / 2), words, chosen, notes: this.bench.notesOf(which).length };
-      })
-      .sort((one, other) => one.x - other.x);
-    const ends = [-Infinity, -Infinity, -Infinity];
-    return labels.map((label) => {
-      const half = wide(label.words, label.chosen) / 2 + 5;
-      const x = Math.min(Math.max(label.x, half), this.width - half - (label.notes ? 14 : 0));
-      let line = ends.findIndex((end) => end < x - half);
-      if (line < 0) line = ends.indexOf(Math.min(...ends));
-      ends[line] = x + half + (label.notes ? 14 : 0);
-      const y = MARGIN.top - 11 - 13 * line;
-      return svg`<g class="label ${label.chosen ? "chosen" : ""}" aria-hidden="true">
-        <text x=${x} y=${y} text-anchor="middle">${label.words}</text>
-        ${label.notes ? this.drawBadge(label.which, x + half + 4, y - 4, label.notes) : nothing}
-      </g>`;
-    });
   }
 
   private drawBadge(which: Selected, x: number, y: number, count: number) {
@@ -379,38 +485,26 @@ export class SideView extends Part {
       <text x=${x} y=${y + 3.4} text-anchor="middle">${count > 1 ? count : "!"}</text><title>${words}</title></g>`;
   }
 
-  /** From one part to the next, below. */
-  private drawDistances(side: Side, scale: Scale) {
-    const places = [...new Set(this.parts().map((which) => this.placeOf(which)))].sort((one, other) => one - other);
-    const y = this.height - 24;
-    const pieces = places.slice(1).map((z, number) => {
-      const [from, to] = [scale.x(places[number]!), scale.x(z)];
-      const words = short(z - places[number]!, 5);
-      const width = wide(words) + 10;
-      return svg`<path d="M${from} ${y}H${to}"></path>
-        ${to - from > width + 4 ? svg`<rect x=${(from + to - width) / 2} y=${y - 7} width=${width} height="14"></rect>
-        <text x=${(from + to) / 2} y=${y + 4} text-anchor="middle">${words}</text>` : nothing}`;
-    });
-    const ticks = places.map((z) => `M${scale.x(z)} ${y - 4}v8`).join("");
-    const scene = side.from < 0 && places.length ? svg`<text class="scene" x="8" y=${y + 4}>← scene</text>` : nothing;
-    return svg`<g class="distances" aria-hidden="true">${pieces}<path d=${ticks}></path>${scene}</g>`;
-  }
-
   static override styles = [
     controls,
     css`
       :host { display: block; position: relative; overflow: hidden; min-height: 150px; }
-      svg { position: absolute; inset: 0; touch-action: pan-y; user-select: none; }
-      svg.grab { cursor: ew-resize; }
+      svg { user-select: none; }
+      :host > svg, svg[role="group"] { position: absolute; inset: 0; }
+      svg.grab { cursor: ew-resize; } svg.pan { cursor: grab; }
+      :host(.over-handle) svg { cursor: move; }
+      svg.stale .rays { opacity: 0.25; }
       text { font-size: 11.5px; fill: var(--quiet); }
       .axis { stroke: var(--edge); stroke-width: 1; stroke-dasharray: 10 3 2 3; fill: none; }
       .rays { pointer-events: none; }
       g.ray path { fill: none; stroke-width: 1.15; stroke-linecap: round; }
-      g.ray.focused path { stroke: var(--focused); } g.ray.focused circle { fill: var(--focused); }
+      g.ray path.beyond { stroke-dasharray: 2 3; stroke-opacity: 0.7; }
+      g.ray circle.meet { stroke: var(--ground); stroke-width: 1; }
+      g.ray.focused path { stroke: var(--focused); stroke-width: 1.5; } g.ray.focused circle { fill: var(--focused); }
       g.ray.near path { stroke: var(--near); } g.ray.near circle { fill: var(--near); }
       g.ray.far path { stroke: var(--far); } g.ray.far circle { fill: var(--far); }
       g.ray.off-axis path { stroke: var(--aside); } g.ray.off-axis circle { fill: var(--aside); }
-      .part { outline: none; }
+      .part, .knob { outline: none; }
       .back.hover { fill: var(--hover); }
       .back.selected { fill: var(--chosen); }
       .strip { fill: transparent; }
@@ -430,19 +524,33 @@ export class SideView extends Part {
       .aperture .handle { fill: var(--edge); }
       .aperture.hover .borders { stroke: var(--ink); } .aperture.hover .handle { fill: var(--ink); }
       .aperture.selected .borders { stroke: var(--accent); } .aperture.selected .handle { fill: var(--accent); }
-      .label.chosen text { fill: var(--accent); font-weight: 600; }
+      .knob circle, .knob path { fill: var(--well); stroke: var(--accent); stroke-width: 1.8; cursor: move; }
+      .knob.active circle, .knob.active path, .knob:focus-visible circle, .knob:focus-visible path { fill: var(--accent); }
+      .knob .sign { font-size: 9.5px; font-weight: 700; fill: var(--accent); pointer-events: none; }
+      .knob.active .sign, .knob:focus-visible .sign { fill: var(--well); }
+      .knob .says { fill: var(--accent); font-weight: 600; opacity: 0; pointer-events: none; paint-order: stroke; stroke: var(--ground); stroke-width: 4px; }
+      .knob:hover .says, .knob:focus-visible .says, .knob .says.active { opacity: 1; }
+      .chosen { fill: var(--accent); font-weight: 600; }
       .badge { cursor: pointer; }
       .badge circle { fill: var(--warn); }
       .badge text { fill: var(--on-warn); font-size: 10px; font-weight: 700; }
       .snap path { stroke: var(--focused); stroke-width: 1; stroke-dasharray: 2 4; stroke-opacity: 0.6; }
-      .snap text { fill: var(--focused); fill-opacity: 0.75; }
+      .snap text { fill: var(--focused); fill-opacity: 0.75; paint-order: stroke; stroke: var(--ground); stroke-width: 4px; }
       .snap.held path { stroke-dasharray: none; stroke-width: 1.5; stroke-opacity: 1; }
       .snap.held text { fill-opacity: 1; font-weight: 600; }
       .distances path { stroke: var(--edge); fill: none; }
       .distances rect { fill: var(--ground); }
+      .magnifier { pointer-events: none; }
+      .magnifier .ground { fill: var(--ground); }
+      .magnifier .edge { fill: none; stroke: var(--edge); }
+      .magnifier .leads { stroke: var(--edge); stroke-dasharray: 2 2; fill: none; }
+      .magnifier text { font-size: 10.5px; paint-order: stroke; stroke: var(--ground); stroke-width: 3px; }
       .legend { position: absolute; left: 10px; right: 10px; bottom: 0; margin: 0; padding: 0; list-style: none; display: flex; justify-content: center; gap: 0 16px; white-space: nowrap; font-size: 11.5px; line-height: 16px; color: var(--quiet); pointer-events: none; }
       .legend i { display: inline-block; width: 14px; height: 2px; margin-right: 6px; vertical-align: 3px; border-radius: 1px; }
       i.focused { background: var(--focused); } i.near { background: var(--near); } i.far { background: var(--far); } i.off-axis { background: var(--aside); }
+      .tools { position: absolute; right: 6px; top: 4px; display: flex; gap: 1px; }
+      .tools .icon, .tools .axis { width: 25px; height: 23px; padding: 0; gap: 1px; color: var(--quiet); stroke: none; }
+      .tools button:disabled { color: var(--faint); }
     `,
   ];
 }

@@ -107,6 +107,8 @@ def _what(train: Train, grid: Grid) -> str:
         f"{grid.channels or 1} channel{'s' if (grid.channels or 1) > 1 else ''}, "
         f"{grid.kind} {SAMPLES_IN_WORDS[grid.sample]}; {grid.geometry}{grid.bands}"
     ]
+    if grid.filling is not None and grid.filling.words:
+        lines.append(f"  {grid.filling.words}")
     return "\n".join([*lines, *train.listed()])
 
 

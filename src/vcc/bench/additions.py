@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
+import itertools
 import math
+import os
 import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import MISSING, Field, is_dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from vcc.base import checks, units
+from vcc.base import units
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.bench.document import shown
@@ -28,6 +32,7 @@ from vcc.files.camera_families import (
     unit_of,
 )
 from vcc.files.camera_reading import Beside, TrainAsWritten, read_array
+from vcc.optics import FirstOrder, Lens
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 
@@ -38,16 +43,19 @@ DEEPEST = 3
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
 
+@functools.cache
 def kinds() -> list[Json]:
     """All kinds of elements, with their parameters."""
-    return [_kind(name, kind) for name, kind in ELEMENT_KINDS.items()]
+    return [_kind(name, kind) | {"addable": name not in FROM_FILES} for name, kind in ELEMENT_KINDS.items()]
 
 
+@functools.cache
 def sensor_parameters() -> list[Json]:
     """The parameters of a sensor."""
     return _parameters(Sensor, DEEPEST)
 
 
+@functools.cache
 def families() -> Json:
     """Patterns, kernels and surfaces by name, with their parameters."""
     found: dict[str, Family] = {}
@@ -146,12 +154,12 @@ def _words_of_parameters(kind: type) -> dict[str, str]:
 # --- new elements ---
 
 
-def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
+def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Json:
     """The table of a new element, with parameters that suit its position.
 
     Args:
         kind: its name in camera files.
-        z: its position, a length as text.
+        z: its position, a length as text; None for one that suits its kind.
         train: the camera that it is added to.
         names: of the elements that exist.
 
@@ -160,14 +168,61 @@ def new_element(kind: Any, z: Any, train: Train, names: set[str]) -> Json:
     """
     if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
         raise InputError(f"unknown kind of element {shown(kind)}: use one of {', '.join(ELEMENT_KINDS)}")
-    place = units.parse(z, "length", "z")
+    if kind in FROM_FILES:
+        raise InputError(
+            f"a {kind.replace('_', ' ')} comes from a lens file: name it in the camera file with which you start "
+            "the bench, or open a camera that has one"
+        )
+    place = _suitable_place(kind, train) if z is None else units.parse(z, "length", "z")
+    given = _length(place, 6) if z is None else z
     long, wide = max(train.sensor.z, 1e-3), _width_at(train, place)
-    table: Json = {"kind": kind, "name": free_name(str(kind).replace("_", " "), names), "z": z}
+    table: Json = {"kind": kind, "name": free_name(str(kind).replace("_", " "), names), "z": given}
+    if kind == "lens_array" and z is None:
+        return table | _lenslets(train)
     make = _NEW.get(str(kind))
     return table | ({} if make is None else make(long, wide))
 
 
-def free_name(wanted: str, names: set[str]) -> str:
+LENSLET_PIXELS = 8
+"""Pixels of the sensor across a new lenslet."""
+FROM_FILES = ("real_lens",)
+"""Kinds that a bench shows and changes, but cannot add."""
+IN_GAPS = ("lens", "first_order")
+BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")
+
+
+def _suitable_place(kind: str, train: Train) -> float:
+    """Where an element of a kind makes sense, metres.
+
+    Lenslets stand a focal length before the sensor, louvres and angle filters close to it, other lenses in the
+    widest gap, and everything else at the first lens or the first rim.
+    """
+    z = train.sensor.z
+    if kind in BEFORE_SENSOR:
+        before = units.parse(_lenslets(train)["focal_length"], "length", "z") if kind == "lens_array" else z / 25
+        return max(z - before, 0.0)
+    stop = next((one.z for one in train.elements if isinstance(one, Lens | FirstOrder)), None)
+    if stop is None:
+        stop = next((stage.z for stage in train.stages if np.isfinite(stage.opening[0])), 0.0)
+    if kind not in IN_GAPS:
+        return min(stop, z)
+    places = sorted({0.0, z, *(end for one in train.elements for end in (one.z, one.z + one.length))})
+    gaps = [(high - low, low) for low, high in itertools.pairwise(places)]
+    widest, low = max(gaps, default=(0.0, 0.0), key=lambda gap: (round(gap[0], 9), -gap[1]))
+    return low + widest / 2
+
+
+def _lenslets(train: Train) -> Json:
+    """Lenslets whose micro-images fill `LENSLET_PIXELS` pixels: their f-number is that of the first opening."""
+    pitch = LENSLET_PIXELS * min(train.sensor.pitches)
+    stop = next((stage for stage in train.stages if np.isfinite(stage.opening[0])), None)
+    if stop is None or not stop.z < train.sensor.z:
+        return {"pitch": _length(pitch), "focal_length": _length(train.sensor.z / 20 or 1e-3)}
+    focal_length = pitch * (train.sensor.z - stop.z) / min(stop.opening)
+    return {"pitch": _length(pitch), "focal_length": _length(min(focal_length, train.sensor.z / 4), 4)}
+
+
+def free_name(wanted: str, names: AbstractSet[str]) -> str:
     """A name that no other element has: the wanted one, or the wanted one with a number."""
     base = re.sub(r" \d+$", "", wanted)
     number, name = 1, wanted
@@ -261,15 +316,18 @@ def made_whole(
     return [(where, value)]
 
 
-def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
-    """The cells of an uploaded image or array: transmissions.
+def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], str | None]:
+    """The cells of an uploaded image or array, transmissions, and a remark if they were reduced.
+
+    Larger arrays are reduced to at most `MOST_BROUGHT` cells, by means over equal areas; several channels become
+    their mean. Images are linear: the readers of camera files decode their transfer function.
 
     Args:
         name: of the file; its ending selects the format.
         buffers: one buffer, the bytes of the file.
 
     Raises:
-        InputError: the readers of camera files do not support it, or it has more than `MOST_BROUGHT` cells.
+        InputError: the readers of camera files do not support it.
     """
     if not isinstance(name, str) or len(buffers) != 1:
         raise InputError("an upload consists of a file name and one buffer of bytes")
@@ -278,15 +336,38 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> list[list[float]]:
         file = Path(folder) / f"brought{ending if ending.isascii() and len(ending) < 8 else ''}"
         file.write_bytes(buffers[0])
         beside = Beside(file.parent, frozenset({file.name}))
-        with checks.within(shown(name)):
+        try:
             values = read_array(file.name, None, True, "the picture", beside)
-    if values.ndim != 2 or values.size > MOST_BROUGHT:
-        size, most = "×".join(map(str, values.shape)), math.isqrt(MOST_BROUGHT)
-        raise InputError(
-            f"{shown(name)} has {size} cells, and a bench supports up to {most}×{most}: reduce it, or name the "
-            "file in the camera file with which you start the bench"
+        except InputError as error:  # it names a file of this function
+            words = str(error).replace(f"{file.parent}{os.sep}", "").replace(folder, "").replace(file.name, name)
+            raise InputError(f"{shown(name)}: {words}") from None
+    if values.ndim == 3:
+        values = values.mean(axis=2)
+    if values.ndim != 2 or values.size == 0:
+        size = "×".join(map(str, values.shape))
+        raise InputError(f"{shown(name)} has {size} numbers: a pattern has rows and columns of cells")
+    rows, columns = values.shape
+    remark = None
+    if values.size > MOST_BROUGHT:
+        share = math.sqrt(MOST_BROUGHT / values.size)
+        counts = max(int(rows * share), 1), max(int(columns * share), 1)
+        counts = min(counts[0], MOST_BROUGHT), min(counts[1], MOST_BROUGHT)
+        values = _means(_means(values, counts[0]).T, counts[1]).T
+        remark = (
+            f"{shown(name)} was reduced from {rows}×{columns} to {counts[0]}×{counts[1]} cells, by their means: a "
+            f"bench supports up to {MOST_BROUGHT}. A file that the camera file names is used as it is."
         )
-    return [[round(float(cell), 4) for cell in row] for row in values]
+    return [[round(float(cell), 4) for cell in row] for row in values], remark
+
+
+def _means(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Means over ``count`` equal parts of the rows; a row that two parts share counts in both by its share."""
+    through = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0)])
+    borders = np.linspace(0, len(values), count + 1)
+    low = np.minimum(borders.astype(np.int64), len(values) - 1)
+    passed = through[low] + (borders - low)[:, None] * values[low]
+    found: NDArray[np.float64] = np.diff(passed, axis=0) / (len(values) / count)
+    return found
 
 
 MOST_BROUGHT = 2**14

@@ -8,17 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.advice.explain import explained
 from vcc.analysis.point_spread import PointSpread, mtf, psf
 from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.bench.document import shown
-from vcc.bench.picture import jpeg
+from vcc.bench.screen import jpeg
 from vcc.camera import Camera
 from vcc.light_field import LightField
 from vcc.optics.train import Train
-from vcc.plan.choice import compile_best
-from vcc.plan.how import How
 from vcc.plot.fans import focused_distance
 from vcc.plot.phase_space import phase_space_at, phase_space_stages
 from vcc.plot.phase_space_rays import PhaseSpacePicture
@@ -59,15 +56,27 @@ def answer(what: Any, message: Json, train: Train, light_field: LightField) -> t
         InputError: unknown question, or this camera has no answer to it.
     """
     if what == "explain":
-        plan = compile_best(train, light_field.grid)
-        return {"words": str(explained(train, light_field, plan, How()))}, []
+        return {"words": str(Camera(train.elements, train.sensor).explain(light_field))}, []
     if what == "point spread":
-        return _point_spread(_psf(message, train))
-    if what == "mtf":
-        return _mtf(message, train), []
-    if what == "phase space":
-        return _phase_space(message, train, light_field)
-    raise InputError(f"unknown question {shown(what)}: use one of {', '.join(QUESTIONS)}")
+        told, pictures = _point_spread(_psf(message, train))
+    elif what == "mtf":
+        told, pictures = _mtf(message, train), []
+    elif what == "phase space":
+        told, pictures = _phase_space(message, train, light_field)
+    else:
+        raise InputError(f"unknown question {shown(what)}: use one of {', '.join(QUESTIONS)}")
+    return told | {"remark": _remark(train)}, pictures
+
+
+def _remark(train: Train) -> str | None:
+    """What an answer leaves out: it is for one camera, and the image is made of several."""
+    said = []
+    depending = [element.label for element in train.elements if element.depends_on_band]
+    if depending:
+        said.append(f"for the design wavelength: {', '.join(depending)} differ between the bands")
+    if train.sensor.has_parts:
+        said.append("for whole pixels: photodiodes and kinds of pixels differ")
+    return f"This is {'; and '.join(said)}." if said else None
 
 
 def _distance(message: Json, train: Train) -> float:

@@ -11,6 +11,7 @@ from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.units import short
+from vcc.bench.messages import SideAperture
 from vcc.fields.grid import Grid
 from vcc.light_field import LightField
 from vcc.optics import FirstOrder, Lens
@@ -126,7 +127,7 @@ def aperture_of(given: Any) -> Aperture:
     return Aperture(given.get("z", NOT_MOVED), (across[0], across[1]))
 
 
-def drawn_aperture(aperture: Aperture, views: LightField, train: Train, axis: int) -> Json:
+def drawn_aperture(aperture: Aperture, views: LightField, train: Train, axis: int) -> SideAperture:
     """The aperture in the side view: the borders of the views' cells, and positions to which it snaps.
 
     Args:

@@ -39,6 +39,16 @@ PLENOPTIC = "Lenslets before the sensor: a plenoptic camera, 5×5 views of 100×
 
 _CAMERAS: dict[str, list[Json]] = {
     "A lens": [_LENS],
+    "A coded aperture": [
+        _LENS,
+        {
+            "kind": "mask",
+            "name": "code",
+            "z": "0 mm",
+            "pattern": {"name": "mura", "prime": 7},
+            "width": "18 mm",
+        },
+    ],
     "A coded aperture (MURA) half-way": [
         _LENS,
         {

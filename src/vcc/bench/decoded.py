@@ -29,7 +29,8 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import spread
-from vcc.bench.picture import Picture, Taken, jpeg, white_of
+from vcc.bench.picture import Taken
+from vcc.bench.screen import Picture, jpeg, white_of
 from vcc.bench.side import scene_distances
 from vcc.camera import Camera
 from vcc.files.pictures import averaged

@@ -16,6 +16,7 @@ from vcc.base import checks, units
 from vcc.base.errors import InputError
 from vcc.bench.aperture import Aperture, aperture_of
 from vcc.files.camera_reading import Beside, TrainAsWritten, train_of_tables
+from vcc.light_field import LightField
 
 Step = str | int
 """One step of a path: the key of a table, or the index in a list."""
@@ -35,7 +36,7 @@ MOST_HISTORY = 2**22
 """Characters of all documents kept for undo."""
 
 _IN_CAMERA = ("elements", "sensor")
-_FIELDS = ("camera", "light_field", "views", "aperture", "exposure", "noise")
+_FIELDS = ("camera", "light_field", "views", "aperture", "wavelengths", "exposure", "noise")
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ class Document:
         exposure: the irradiance shown as white, above 0; None chooses it for each image.
         noise: whether the sensor's electronics record the image.
         aperture: the position of the plane of the views.
+        wavelengths: of the light field's channels, lengths as text; None for its own.
     """
 
     camera: Mapping[str, Any]
@@ -84,6 +86,7 @@ class Document:
     exposure: float | None = None
     noise: bool = False
     aperture: Aperture = field(default_factory=Aperture)
+    wavelengths: tuple[str, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The document as JSON, for messages and URLs."""
@@ -93,6 +96,7 @@ class Document:
             "light_field": self.light_field,
             "views": views,
             "aperture": self.aperture.as_json(),
+            "wavelengths": None if self.wavelengths is None else list(self.wavelengths),
             "exposure": self.exposure,
             "noise": self.noise,
         }
@@ -105,9 +109,7 @@ class Document:
             InputError: not a document.
         """
         if not isinstance(given, dict):
-            raise InputError(
-                "a bench's document is a table of camera, light_field, views, aperture, exposure and noise"
-            )
+            raise InputError(f"a bench's document is a table of {', '.join(_FIELDS)}")
         for key in given:
             if key not in _FIELDS:
                 raise InputError(f"a bench's document has no {shown(key)}: it has {', '.join(_FIELDS)}")
@@ -121,6 +123,7 @@ class Document:
             _exposure(given.get("exposure")),
             _truth("noise", given.get("noise", False)),
             aperture_of(given.get("aperture")),
+            _wavelengths(given.get("wavelengths")),
         )
 
     def changed(self, where: Any, value: Any) -> Document:
@@ -145,6 +148,17 @@ class Document:
                 raise InputError("a bench needs a light field: choose another one instead")
             return Document.of_json(whole)
         return Document.of_json(_put(whole, path, value, "the bench"))
+
+    def coloured(self, light_field: LightField) -> LightField:
+        """The light field with the wavelengths of this document.
+
+        Raises:
+            InputError: not as many as channels, or one that is not a length of light.
+        """
+        if self.wavelengths is None:
+            return light_field
+        name = "wavelengths of the light field"
+        return light_field.with_wavelengths([units.parse(each, "length", name) for each in self.wavelengths])
 
     def train(self, beside: Beside) -> TrainAsWritten:
         """The camera that the tables describe.
@@ -311,6 +325,16 @@ def _two(name: str, given: Any) -> tuple[int, int]:
     if not isinstance(given, list) or len(given) != 2 or not all(type(each) is int for each in given):
         raise InputError(f"{name} of views are [first, last], two whole numbers, not {shown(given)}")
     return given[0], given[1]
+
+
+def _wavelengths(given: Any) -> tuple[str, ...] | None:
+    if given is None:
+        return None
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise InputError(f'wavelengths are lengths, such as ["610 nm", "540 nm", "465 nm"], not {shown(given)}')
+    for each in given:
+        units.parse(each, "length", "wavelengths of the light field")
+    return tuple(given)
 
 
 def _exposure(given: Any) -> float | None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base import units
 from vcc.base.affine import Affine
 from vcc.base.describe import is_default
 from vcc.base.errors import InputError
@@ -127,6 +128,9 @@ def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.flo
     if views is not None:
         (a, b), (c, d) = views.rows, views.columns
         source += f"\nlight_field = light_field[{a} : {b + 1}, {c} : {d + 1}]"
+    if bench.document.wavelengths is not None:
+        metres = [units.parse(each, "length", "wavelengths") for each in bench.document.wavelengths]
+        source += f"\nlight_field = light_field.with_wavelengths({metres!r})"
     if bench.document.aperture.is_moved:
         source += f"\n{bench.document.aperture.in_python}"
     lines = [

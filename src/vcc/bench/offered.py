@@ -141,6 +141,7 @@ class Offered:
         start: the first document.
         beside: the files that cameras may name.
         gallery: example cameras by their titles.
+        presets: those to begin with: a short title, a sentence and a thumbnail, JPEG or WebP, by title.
         turn: the lock to hold while making an image.
     """
 
@@ -148,6 +149,7 @@ class Offered:
     start: Document
     beside: Beside
     gallery: Mapping[str, Document] = field(default_factory=dict)
+    presets: Mapping[str, tuple[str, str, bytes]] = field(default_factory=dict)
     turn: Turn = field(default_factory=Turn, compare=False)
 
     def field(self, name: str) -> Field:
@@ -177,7 +179,8 @@ def _halved(light_field: LightField) -> LightField:
     cut = (1, 1, rows, columns)
     beyond = tuple((a // n, b // n) for (a, b), n in zip(light_field.beyond, cut, strict=True))
     frame = light_field.frame @ to_fine
-    return LightField(coarse, frame, disparities, extent=light_field.extent, beyond=beyond)
+    made = LightField(coarse, frame, disparities, extent=light_field.extent, beyond=beyond)
+    return made.with_wavelengths(light_field.grid.wavelengths)
 
 
 def _mean(view: NDArray[np.generic], rows: int, columns: int, kind: np.dtype[np.generic]) -> NDArray[np.generic]:

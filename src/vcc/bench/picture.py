@@ -1,58 +1,38 @@
-"""Images for a bench: coarse ones during a drag, whole ones at rest, and their encoding for a screen."""
+"""Images for a bench: coarse ones during a drag, whole ones at rest."""
 
 from __future__ import annotations
 
 import functools
-import math
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError
 from vcc.base.progress import Progress
-from vcc.bench.document import Document, Views
+from vcc.bench.document import Document
 from vcc.bench.offered import Field
+from vcc.bench.screen import Picture
 from vcc.fields.grid import Grid
-from vcc.files.pictures import auto_exposure
-from vcc.files.transfer import encode
-from vcc.image import Image
+from vcc.fields.samples import Samples
+from vcc.image import Image, PhotodiodeImage, interleaved
 from vcc.light_field import LightField
+from vcc.optics.bands import trains_of
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
-from vcc.plan.following import NONE_KEPT, Parts
+from vcc.plan.following import Parts
 from vcc.plan.model import Plan
 from vcc.plan.operators import SharpenViews
 from vcc.plan.rays.bounds.windows import CellWindows
 from vcc.plan.rays.compile import DEFAULT_SAMPLES
 from vcc.plan.rays.model import Rays
 from vcc.recording import Recording, recorded
+from vcc.run.bands import BandImages, SomeChannels
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
 
-Picture = NDArray[np.float32]
-
-IN_TIME = 0.02
-"""Time limit of an image during a drag, seconds: if a finer one takes longer, a coarser one is made."""
-LONGER, SHORTER = 0.2, 0.6
-"""Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
-FORGOTTEN = 0.99
-"""Factor on the times of finer images with each coarser one: after some 140 the expected time has halved."""
-MOST_KINDS = 50
-"""Camera kinds whose times are remembered."""
 FEWEST_RAYS = 2
 """Rays through a window or a cell: the least from which a run can estimate their variance."""
-SHADES = 4096
-"""Levels of linear light in images for the screen."""
-QUALITY = {False: 95, True: 75}
-"""JPEG quality of whole (False) and coarse (True) images."""
-SUBSAMPLING = {False: "444", True: "420"}
-"""JPEG chroma subsampling: users inspect single pixels of a whole image."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +56,27 @@ class Fineness:
 
 
 WHOLE = Fineness(1, None)
-COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(8, 4))
-"""Choices for images in time, finest first."""
-COARSEST = COARSER[-1].pixels
-"""Pixels of a view, each way, that are merged into one at most."""
+COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(4, 4))
+"""Choices for images in time, finest first; none has fewer than a quarter of the pixels along a side."""
+COARSEST = 8
+"""Pixels of a view, each way, that are merged into one at most: behind lenslets, views are read more coarsely."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Brief):
+    """One run of an image: one photodiode, and the channels that the same train meets.
+
+    Args:
+        train: the optics.
+        samples: the light field, or some of its channels.
+        plan: that made it.
+        found: the result.
+    """
+
+    train: Train
+    samples: Samples
+    plan: Plan
+    found: Recorded
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,17 +86,15 @@ class Taken(Brief):
     Args:
         image: irradiance, or its estimate from the recording.
         recording: by the sensor's electronics; None without noise.
-        plan: the plan that made it.
-        found: the result of the run.
+        runs: that made it: one, if the camera has no photodiodes and does not depend on the wavelength.
         coarse: whether fewer pixels or rays were used.
         seconds: total time.
-        planning: the part of these seconds before the plan was ready.
+        planning: the part of these seconds in which plans were made.
     """
 
     image: Image
     recording: Recording | None
-    plan: Plan
-    found: Recorded
+    runs: tuple[Run, ...]
     coarse: bool
     seconds: float
     planning: float
@@ -110,91 +105,37 @@ class Taken(Brief):
         values: Picture = self.image.values
         return values
 
+    @property
+    def plan(self) -> Plan:
+        """The first plan."""
+        return self.runs[0].plan
 
-class Pace:
-    """Chooses the fineness of an image from the times of earlier images of the same kinds of elements.
+    @property
+    def by_rays(self) -> bool:
+        """Whether rays were traced."""
+        return any(run.plan.by_rays for run in self.runs)
 
-    For a fineness without a measurement, the estimate is the planning time of another fineness plus its run
-    time scaled by the work. A measurement is dropped if a finer image takes less time, as the first included
-    the compilation of kernels. It also decays a little with each coarser image, so that the finer one is
-    tried again after a busy period.
-    """
-
-    def __init__(self) -> None:
-        self._kept: dict[Hashable, _Kept] = {}
-
-    def noted(self, of: Hashable, fineness: Fineness, taken: Taken) -> None:
-        """Record the time of an image.
-
-        Args:
-            of: the key of cameras and light fields that take about the same time.
-            fineness: of the image.
-            taken: the image.
-        """
-        kept = self._kept.pop(of, None)
-        if kept is None or kept.by_rays != taken.plan.by_rays:
-            kept = _Kept(taken.plan.by_rays, {})
-        share = fineness.share(kept.by_rays)
-        before = kept.took.get(share, (taken.planning, taken.seconds))
-        recent = LONGER if taken.seconds > before[1] else SHORTER
-        kept.took[share] = (
-            (1 - recent) * before[0] + recent * taken.planning,
-            (1 - recent) * before[1] + recent * taken.seconds,
-        )
-        for other, (planning, seconds) in list(kept.took.items()):
-            if other > share:
-                kept.took[other] = planning, seconds * FORGOTTEN
-            elif other < share and seconds > taken.seconds:
-                del kept.took[other]
-        self._kept[of] = kept
-        if len(self._kept) > MOST_KINDS:
-            del self._kept[next(iter(self._kept))]
-
-    def seconds(self, of: Hashable) -> float | None:
-        """Expected time of a whole image, seconds; None without measurements."""
-        return self._kept[of].expected(WHOLE) if of in self._kept else None
-
-    def fineness(self, of: Hashable) -> Fineness:
-        """The finest expected in time, or else the coarsest; without measurements, the finest coarse one."""
-        if of not in self._kept:
-            return COARSER[0]
-        kept = self._kept[of]
-        return next((each for each in (WHOLE, *COARSER) if kept.expected(each) <= IN_TIME), COARSER[-1])
+    @property
+    def photodiodes(self) -> list[list[Picture]]:
+        """The image of each photodiode in a pixel, rows of columns."""
+        if isinstance(self.image, PhotodiodeImage):
+            return [[each.values for each in row] for row in self.image.photodiodes]
+        return [[self.values]]
 
 
-@dataclass(frozen=True)
-class _Kept:
-    """Measured times of images of one kind.
-
-    Args:
-        by_rays: whether rays made them.
-        took: (seconds until the plan was ready, seconds in all) by share of the work.
-    """
-
-    by_rays: bool
-    took: dict[float, tuple[float, float]]
-
-    def expected(self, fineness: Fineness) -> float:
-        """Expected time of an image, seconds."""
-        share = fineness.share(self.by_rays)
-        if share in self.took:
-            return self.took[share][1]
-        return min(
-            planning + share / other * (seconds - planning) for other, (planning, seconds) in self.took.items()
-        )
-
-
-def light_field_of(field: Field, views: Views | None, fineness: Fineness, progress: Progress | None) -> LightField:
-    """The part of a light field that an image is made of.
+def light_field_of(
+    field: Field, document: Document, pixels: int = 1, progress: Progress | None = None
+) -> LightField:
+    """The light field of a document, with blocks of pixels merged.
 
     Raises:
-        InputError: the light field lacks the views, or cannot be opened.
+        InputError: the light field lacks the views, cannot have these wavelengths, or cannot be opened.
     """
-    chosen = field.with_pixels_of(fineness.pixels, progress)
-    if views is None:
-        return chosen
-    views.check(chosen.shape)
-    return chosen[views.slices]
+    chosen = field.with_pixels_of(pixels, progress)
+    if document.views is not None:
+        document.views.check(chosen.shape)
+        chosen = chosen[document.views.slices]
+    return document.aperture.placed(document.coloured(chosen))
 
 
 def coarser_sensor(train: Train, step: int) -> Train:
@@ -216,6 +157,7 @@ def take(
     document: Document,
     fineness: Fineness = WHOLE,
     progress: Progress | None = None,
+    kept: Parts | None = None,
 ) -> Taken:
     """The image that a bench shows.
 
@@ -225,33 +167,93 @@ def take(
         document: selects the views, and whether electronics record the image.
         fineness: a coarse image has no noise, because its pixels are not those of the sensor.
         progress: called with (done, total), also during planning; an exception that it raises ends the work.
+        kept: costly parts of the plan before, of the same fineness; it also ends the planning.
 
     Raises:
         InputError: the camera does not support this light field, or the electronics cannot record it.
     """
     began = time.perf_counter()
-    light_field = document.aperture.placed(light_field_of(field, document.views, fineness, progress))
-    camera = train if fineness.pixels == 1 else coarser_sensor(train, fineness.pixels)
-    wanted = NONE_KEPT if progress is None else Parts(functools.partial(progress, 0, 1))
-    plan = compile_best(camera, light_field.grid, None, wanted)
-    if fineness.rays is not None and isinstance(plan.core, Rays):
-        if isinstance(plan.core.aim, CellWindows):
-            wide = replace(fineness, pixels=min(2 * fineness.pixels, COARSEST))
-            coarser = document.aperture.placed(light_field_of(field, document.views, wide, progress))
-            plan = _looking_at(plan, plan.core, light_field.grid, coarser.grid)
-            light_field = coarser
-        plan = _with_fewer_rays(plan, fineness.rays)
-    planning = time.perf_counter() - began
-    found = drive(plan, light_field, None, progress)
-    image = Image(found.values, camera.sensor.frame, found.missing_rays, found.sampling_error, camera=camera)
+    kept = kept or Parts(None if progress is None else functools.partial(progress, 0, 1))
+    made = _Making(field, document, fineness, progress, kept)
+    with kept.keeping():
+        image = made.image(train)
     recording = None
     if document.noise and fineness == WHOLE:
         exposure = Exposure(train.sensor, "auto")
-        exposure.check_channels(light_field.grid.channels)
+        exposure.check_channels(train.sensor.channels_of(made.light_field.grid.channels))
         recording = recorded(image, exposure)
         filtered = recording.electronics.color_filter is not None
         image = recording.demosaiced("bilinear") if filtered else recording.image()
-    return Taken(image, recording, plan, found, fineness != WHOLE, time.perf_counter() - began, planning)
+    seconds = time.perf_counter() - began
+    return Taken(image, recording, tuple(made.runs), fineness != WHOLE, seconds, made.planning)
+
+
+class _Making:
+    """An image in the making: of photodiodes, of pixels that alternate, and of bands of light.
+
+    Attributes:
+        runs: so far.
+        planning: seconds so far.
+    """
+
+    def __init__(
+        self, field: Field, document: Document, fineness: Fineness, progress: Progress | None, kept: Parts
+    ) -> None:
+        self.field, self.document, self.fineness, self.progress = field, document, fineness, progress
+        self.light_field = light_field_of(field, document, fineness.pixels, progress)
+        self.kept = kept
+        self.runs: list[Run] = []
+        self.planning = 0.0
+
+    def image(self, train: Train) -> Image:
+        """The image of a train; of one with several photodiodes a `PhotodiodeImage`."""
+        sensor, kinds = train.sensor, train.sensor.pixel_kinds
+        if len(kinds) * len(kinds[0]) > 1:
+            tile = self._each(train.pixel_kind, len(kinds), len(kinds[0]))
+            return interleaved(tile, train) if self.fineness.pixels == 1 else _mean(tile)
+        if sensor.photodiodes != (1, 1):  # of the sensor's own pixels, before they are merged
+            return PhotodiodeImage.of(self._each(train.photodiode, *sensor.photodiodes), train)
+        return self._plain(train if self.fineness.pixels == 1 else coarser_sensor(train, self.fineness.pixels))
+
+    def _each(self, part: Callable[[int, int], Train], rows: int, columns: int) -> list[list[Image]]:
+        return [[self.image(part(row, column)) for column in range(columns)] for row in range(rows)]
+
+    def _plain(self, train: Train) -> Image:
+        grid = self.light_field.grid
+        if not train.depends_on_bands:
+            found = self._run(train, self.light_field, None)
+        else:
+            ways = trains_of(train, grid.channels, grid.wavelengths)
+            parts = [(way, self._run(way.train, self.light_field, way.channels)) for way in ways]
+            found = BandImages(train.sensor, grid, parts).recorded
+        return Image(found.values, train.sensor.frame, found.missing_rays, found.sampling_error, camera=train)
+
+    def _run(self, train: Train, light_field: LightField, channels: tuple[int, ...] | None) -> Recorded:
+        began, progress = time.perf_counter(), self.progress
+        samples = light_field if channels is None else SomeChannels.of(light_field, channels)
+        plan = compile_best(train, samples.grid, None, self.kept)
+        rays = self.fineness.rays
+        if rays is not None and isinstance(plan.core, Rays):
+            if isinstance(plan.core.aim, CellWindows):
+                pixels = min(2 * self.fineness.pixels, COARSEST)
+                coarser: Samples = light_field_of(self.field, self.document, pixels, progress)
+                coarser = coarser if channels is None else SomeChannels.of(coarser, channels)
+                plan = _looking_at(plan, plan.core, samples.grid, coarser.grid)
+                samples = coarser
+            plan = _with_fewer_rays(plan, rays)
+        self.planning += time.perf_counter() - began
+        found = drive(plan, samples, None, progress)
+        self.runs.append(Run(train, samples, plan, found))
+        return found
+
+
+def _mean(tile: Sequence[Sequence[Image]]) -> Image:
+    """The image of pixels over which a whole tile of responses alternates."""
+    listed = [image for row in tile for image in row]
+    total = listed[0]
+    for image in listed[1:]:
+        total = total + image
+    return total / len(listed)
 
 
 def _with_fewer_rays(plan: Plan, rays: int) -> Plan:
@@ -280,86 +282,3 @@ def _looking_at(plan: Plan, core: Rays, fine: Grid, coarse: Grid) -> Plan:
         views=(nv, nu, nt, ns),
     )
     return replace(plan, core=made, grid_shape=coarse.shape[:4])
-
-
-# --- for a screen ---
-
-
-def white_of(values: Picture) -> float:
-    """The default irradiance shown as white, as in `vcc.Image.save`."""
-    return 1 / auto_exposure(_shown(values))
-
-
-def codes(values: Picture, white: float) -> NDArray[np.uint8]:
-    """An image for display: upright, 8-bit sRGB codes.
-
-    Args:
-        values: irradiance in the orientation of the sensor.
-        white: the irradiance shown as white.
-    """
-    scaled = _shown(values)[::-1, ::-1] * np.float32((SHADES - 1) / white)
-    np.nan_to_num(scaled, copy=False)
-    np.clip(scaled, 0, SHADES - 1, out=scaled)
-    found: NDArray[np.uint8] = np.take(_codes(), scaled.astype(np.uint16))
-    return found
-
-
-def jpeg(values: Picture, white: float, coarse: bool = False) -> bytes:
-    """`codes` as a JPEG.
-
-    Args:
-        values: irradiance in the orientation of the sensor.
-        white: the irradiance shown as white.
-        coarse: whether to compress more.
-    """
-    import imagecodecs
-
-    return bytes(
-        imagecodecs.jpeg_encode(codes(values, white), level=QUALITY[coarse], subsampling=SUBSAMPLING[coarse])
-    )
-
-
-@functools.cache
-def _codes() -> NDArray[np.uint8]:
-    """The sRGB code of each level of linear light."""
-    codes: NDArray[np.uint8] = encode(np.arange(SHADES, dtype=np.float32) / np.float32(SHADES - 1), 8)
-    return codes
-
-
-def _shown(values: Picture) -> Picture:
-    """Channels for a screen: one or three as they are, otherwise their mean."""
-    if values.ndim == 2 or values.shape[2] == 3:
-        return values
-    mean: Picture = values.mean(axis=2, dtype=np.float32)
-    return mean
-
-
-def psnr(one: Picture, other: Picture, white: float) -> float | None:
-    """10·log10(white² / mean squared difference), dB, in linear light; None if the sizes differ.
-
-    Args:
-        one: irradiance.
-        other: likewise.
-        white: the irradiance that counts as the peak.
-    """
-    if one.shape != other.shape:
-        return None
-    mean_square = float(np.mean(np.square(one - other, dtype=np.float64)))
-    return math.inf if mean_square == 0 else 10 * math.log10(white**2 / mean_square)
-
-
-def pixel_at(shape: Sequence[int], x: Any, y: Any) -> tuple[int, int]:
-    """(row, column) on the sensor of a pixel of the upright image.
-
-    Args:
-        shape: of the image.
-        x: the pixel's column in the upright image, from 0.
-        y: its row.
-
-    Raises:
-        InputError: the pixel does not exist.
-    """
-    rows, columns = shape[:2]
-    if type(x) is not int or type(y) is not int or not (0 <= x < columns and 0 <= y < rows):
-        raise InputError(f"the picture has no pixel ({x}, {y}): it has {columns} columns and {rows} rows")
-    return rows - 1 - y, columns - 1 - x

@@ -20,8 +20,9 @@ from urllib.parse import urlsplit
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.bench.carried import DamagedMessage, packed, unpacked
+from vcc.bench.inbox import Broken
 from vcc.bench.offered import Offered
-from vcc.bench.session import Broken, Session
+from vcc.bench.session import Session
 
 if TYPE_CHECKING:
     from starlette.applications import Starlette
@@ -30,13 +31,12 @@ if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
 LOOPBACK = "127.0.0.1"
-OF_THIS_MACHINE = (LOOPBACK, "localhost", "::1")
 MOST_CLIENTS = 10
 """Concurrent clients, including disconnected ones that may come back."""
 KEPT = 600.0
 """Seconds for which the session of a disconnected client is kept."""
-LARGEST_MESSAGE = 2**20
-"""Bytes of a message that a client may send."""
+LARGEST_MESSAGE = 2**25
+"""Bytes of a message that a client may send: a photograph, or a camera with some hundred masks of 128×128."""
 MOST_UNSENT = 2**26
 """Bytes that may wait for a slow client; above, it is disconnected."""
 NEWEST_ONLY = ("picture", "state", "progress", "notes", "value")
@@ -60,47 +60,38 @@ TOO_MANY, BROKEN, FORBIDDEN = 1013, 1008, 4403
 
 @dataclass(frozen=True)
 class Door:
-    """Access control of a bench.
+    """Access control of a bench: every client needs the token, since this machine may have other users.
 
     Args:
         host: the address that the server listens on.
-        token: required from clients; empty if only this machine can connect.
+        token: required from clients.
     """
 
-    host: str = LOOPBACK
-    token: str = ""
+    host: str
+    token: str
 
     @classmethod
-    def of(cls, host: str) -> Door:
-        """Free access from this machine; a random token for any other host."""
-        return cls(host, "" if host in OF_THIS_MACHINE else secrets.token_urlsafe(24))
+    def of(cls, host: str = LOOPBACK) -> Door:
+        """With a random token."""
+        return cls(host, secrets.token_urlsafe(24))
 
     def opens(self, token: str | None, origin: str | None, asked: str | None) -> bool:
         """Whether a client may connect.
 
         Web pages of other sites may open sockets to this machine. Therefore the origin that the browser
-        reports must equal the requested host. Without a token, that host must be a name of this machine, so
-        that a foreign domain that resolves to this machine is rejected.
+        reports must equal the requested host; a foreign domain that resolves to this machine lacks the token.
 
         Args:
             token: sent by the client.
             origin: of the page, as reported by the browser; None without a browser.
             asked: the requested host.
         """
-        if self.token:
-            if not hmac.compare_digest((token or "").encode(), self.token.encode()):
-                return False
-        elif _name_of(asked) not in OF_THIS_MACHINE:
+        if not hmac.compare_digest((token or "").encode(errors="replace"), self.token.encode()):
             return False
-        return origin is None or urlsplit(origin).netloc == asked
-
-
-def _name_of(host: str | None) -> str | None:
-    """A host without its port."""
-    try:
-        return urlsplit(f"//{host}").hostname if host else None
-    except ValueError:
-        return None
+        try:
+            return origin is None or urlsplit(origin).netloc == asked
+        except ValueError:  # no address at all
+            return False
 
 
 class Outbox:
@@ -154,7 +145,8 @@ class Clients:
         """Serve one client until it disconnects."""
         headers, asked = socket.headers, socket.query_params
         if not self.door.opens(asked.get("token"), headers.get("origin"), headers.get("host")):
-            await socket.close(FORBIDDEN)
+            await socket.accept()  # so that the page learns why
+            await socket.close(FORBIDDEN, "the token is missing or of another bench")
             return
         await socket.accept()
         if not self._has_room(asked.get("key")):
@@ -273,9 +265,6 @@ def application(offered: Offered, door: Door, files: Mapping[str, bytes]) -> Sta
     async def page(request: Request) -> Response:
         path = "/index.html" if request.url.path == "/" else request.url.path
         ending = f".{path.rpartition('.')[2]}"
-        asked = request.headers.get("host")
-        if not door.token and _name_of(asked) not in OF_THIS_MACHINE:
-            return Response("This bench accepts connections from this machine only.", 403)
         if path not in pages or ending not in TYPES:
             return Response("There is no such page.", 404)
         return Response(pages[path], media_type=TYPES[ending], headers=HEADERS)
@@ -328,12 +317,12 @@ def listening(host: str, port: int) -> socket.socket:
 def run(
     offered: Offered, *, host: str = LOOPBACK, port: int = 0, browser: bool = True, say: Callable[[str], None]
 ) -> None:
-    """Serve a bench until Ctrl-C.
+    """Serve a bench until Ctrl-C, which is its ordinary end.
 
     Args:
         offered: the light fields, cameras and files of the bench.
-        host: the address to listen on: the loopback address, or one that other machines reach. Other machines
-            need the token in the printed address.
+        host: the address to listen on: the loopback address, or one that other machines reach. Clients need the
+            token in the printed address.
         port: 0 for a free one.
         browser: whether to open a browser.
         say: prints the address.
@@ -362,7 +351,7 @@ def run(
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         server.run(sockets=[made])
     if server.interrupted:
-        raise KeyboardInterrupt
+        say("The bench has ended.")
 
 
 def _server(uvicorn: Any, config: Any) -> Any:
@@ -387,8 +376,8 @@ def _server(uvicorn: Any, config: Any) -> Any:
 
 
 def address_of(door: Door, port: int) -> str:
-    """The URL to open, with the token in its query if there is one."""
+    """The URL to open, with the token in its query."""
     host = f"[{door.host}]" if ":" in door.host else door.host
     if door.host in ("0.0.0.0", "::"):
         host = socket.gethostname()
-    return f"http://{host}:{port}/" + (f"?token={door.token}" if door.token else "")
+    return f"http://{host}:{port}/?token={door.token}"

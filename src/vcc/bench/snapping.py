@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,13 @@ from numpy.typing import NDArray
 from vcc.advice.words import distance_in_words
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.bench.messages import Snap
 from vcc.optics import Element
 from vcc.optics.focusing import focused_train
 from vcc.optics.train import Train
 from vcc.plot.fans import plane_to_focus
 
 Array = NDArray[np.float64]
-Json = dict[str, Any]
 
 ALIKE = 1e-6
 """Tolerance on where rays meet, as a share of the beam: rounding errors are smaller, astigmatism is larger."""
@@ -30,7 +29,7 @@ STEP = Affine.propagation(1.0).linear - NOTHING
 """The change of rays over a flight of 1 m, added to `NOTHING`."""
 
 
-def snaps_of_sensor(train: Train, distances: Mapping[str, float]) -> list[Json]:
+def snaps_of_sensor(train: Train, distances: Mapping[str, float]) -> list[Snap]:
     """Positions of the sensor that bring distances into focus, nearest the scene first: z in metres, and text.
 
     Args:
@@ -49,7 +48,7 @@ def snaps_of_sensor(train: Train, distances: Mapping[str, float]) -> list[Json]:
 
 def snaps_of_elements(
     elements: Sequence[Element], train: Train, distances: Mapping[str, float]
-) -> list[list[Json]]:
+) -> list[list[Snap]]:
     """Positions of each affine element that bring distances into focus, all else fixed; format as for the sensor.
 
     With the element a behind the one before it, the rays of a point at Z meet on the sensor if A(a) + B(a)/Z
@@ -64,7 +63,7 @@ def snaps_of_elements(
     """
     asked = [(name, distance) for name, distance in distances.items() if distance > 0]
     (stop, beyond), powers = plane_to_focus(train), {id(one): _power(one) for one in train.elements}
-    found: list[list[Json]] = []
+    found: list[list[Snap]] = []
     for moved in elements:
         snaps = []
         if asked and moved.z <= stop and not np.array_equal(powers[id(moved)], NOTHING):
@@ -127,11 +126,11 @@ def _sharp(ways: Array, rooms: Array, distances: Array) -> list[tuple[int, int, 
     return found
 
 
-def _snap(z: float, name: str, distance: float) -> Json:
+def _snap(z: float, name: str, distance: float) -> Snap:
     return {"z": z, "words": f"{name}, {distance_in_words(distance)}, is sharp"}
 
 
-def _in_order(snaps: list[Json]) -> list[Json]:
+def _in_order(snaps: list[Snap]) -> list[Snap]:
     return sorted(snaps, key=lambda snap: float(snap["z"]))
 
 

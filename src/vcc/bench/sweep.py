@@ -28,11 +28,15 @@ class Sweep:
     """The frames of a sweep.
 
     Args:
+        label: of the parameter.
+        values: as text.
         documents: one for each value.
         writer: of the film.
         there_and_back: whether the frames are repeated in reverse order.
     """
 
+    label: str
+    values: tuple[str, ...]
     documents: tuple[Document, ...]
     writer: Film
     there_and_back: bool
@@ -83,7 +87,18 @@ def sweep_of(message: dict[str, Any], document: Document) -> Sweep:
         )
     values = _between(message.get("from"), message.get("to"), count)
     documents = tuple(document.changed(message.get("where"), value) for value in values)
-    return Sweep(documents, Film(ending, rate), message.get("there_and_back") is not False)
+    where = message.get("where")
+    label = str(where[-1]).replace("_", " ") if isinstance(where, list) else ""
+    there_and_back = message.get("there_and_back") is not False
+    return Sweep(label, tuple(map(_in_words, values)), documents, Film(ending, rate), there_and_back)
+
+
+def _in_words(value: Any) -> str:
+    """A value of a sweep, to six digits."""
+    if isinstance(value, str):
+        number, unit = value.split(" ", 1) if " " in value else (value, "")
+        return f"{float(number):.6g} {unit}".strip()
+    return f"{value:.6g}"
 
 
 def _between(first: Any, last: Any, count: int) -> list[Any]:

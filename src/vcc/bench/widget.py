@@ -11,8 +11,9 @@ from weakref import WeakValueDictionary
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.bench.document import Document
+from vcc.bench.inbox import Broken
 from vcc.bench.offered import Field, Offered
-from vcc.bench.session import Broken, Session
+from vcc.bench.session import Session
 from vcc.camera import Camera
 from vcc.fields.samples import check_is_light_field
 from vcc.files.camera_reading import Beside

@@ -14,6 +14,7 @@ from vcc.bench.document import Document
 from vcc.bench.offered import Field, Offered
 from vcc.bench.published import Gallery, title_of
 from vcc.bench.server import LOOPBACK, run
+from vcc.bench.starting import presets
 from vcc.camera_file import load_camera
 from vcc.cli.console import show
 from vcc.cli.options import Reading, Whole
@@ -59,7 +60,7 @@ def bench(
         raise InputError("give a camera file or --gallery NAME, not both")
     else:
         start, beside = _document(camera, name)
-    offered = Offered(fields, start, beside, shown)
+    offered = Offered(fields, start, beside, shown, presets(shown))
     # Opens while the browser starts; a client that is faster waits for the same lock.
     threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
     run(offered, host=host, port=port, browser=not no_browser, say=show)

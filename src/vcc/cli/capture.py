@@ -47,7 +47,7 @@ def capture(
             image = moving.capture(
                 field, length, how, start=start, time_tolerance=tolerance, progress=advance, executor=executor
             )
-        elif moving.camera.depends_on_bands or moving.camera.sensor.has_parts:
+        elif moving.camera.sensor.has_parts:
             image = moving.camera.capture(field, how, executor=executor, progress=advance)
         else:
             plan = moving.camera.compile(field, how, progress=advance)

@@ -200,9 +200,11 @@ def _with_its_codes(
     """
     if is_store(source):
         return reading.light_field(source), "linear", None
-    facts = read_geometry(source, **reading.given(Arrangement))
+    facts = read_geometry(source, sparse=reading.missing != "refuse", **reading.given(Arrangement))
     assumed = [name for name in facts.unknown if getattr(reading, name) is None]
     facts.metadata.check(reading.transfer)
+    if facts.missing and reading.missing == "fill":  # views are rendered, and their errors stated, in linear light
+        return reading.in_memory(source), "linear", assumed
     as_stored, transfer = facts.codes
     field = dataclasses.replace(reading, transfer=as_stored).in_memory(source)
     if field.values.dtype.kind != "u" or reading.transfer == "as-is":

@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.reading import expanded, reading, shown
 from vcc.base.units import short
+from vcc.base.wavelengths import as_text
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
 from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, given_options
 from vcc.cli.store_words import looked_at, places_of, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
-from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, read_geometry
+from vcc.formats import FolderInfo, keep_geometry, lytro_lfp, open_sparse_views, open_unstructured, read_geometry
 from vcc.formats.dark_views import dark_words, mean_light
 from vcc.formats.lytro_lfp import read_lytro
+from vcc.formats.unstructured import recognised as has_poses
 from vcc.light_field import LightField
 from vcc.store import is_store, is_video, open_store, open_video
 
@@ -73,7 +75,12 @@ def describe(
         what = "a store, which states its cameras" if is_store(path) else "a raw recording: it has no views yet"
         raise InputError(f"{path} is {what}: leave out {', '.join(given)}")
     with reading(path, "a light field"):
-        if lytro_lfp.recognised(path):
+        if has_poses(path):
+            if given or picture is not None:
+                what = "photographs with poses, which state their cameras"
+                raise InputError(f"{path} is {what}: leave out {', '.join(given or ['--picture'])}")
+            lines = open_unstructured(path).facts()
+        elif lytro_lfp.recognised(path):
             if picture is not None:
                 raise InputError(f"{path} is a raw recording of a Lytro camera: it has no grid of views to draw")
             lines = _lytro_facts(path)
@@ -161,7 +168,7 @@ def _of_a_store(path: Path, quick: bool, picture: Path | None) -> dict[str, str]
 
     views = Views(view, (there[0], there[1]), stored.frame, "linear")
     if missing:
-        lines["missing"] = _missing(sorted(missing), there[0] * there[1])
+        lines["missing"] = _missing(sorted(missing), there[0] * there[1], "write them")
     if not quick and len(missing) < there[0] * there[1]:
         lines |= _light(views)
     if picture is not None:
@@ -207,6 +214,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "format": facts.format,
         "views": f"{facts.rows} × {facts.columns} (rows × columns)",
         "pictures": f"{facts.width} × {facts.height} pixels, {colour}, {kind}",
+        **({} if facts.wavelengths is None else {"bands": as_text(facts.wavelengths).partition(" ")[2]}),
         "samples": SAMPLES_IN_WORDS[facts.sample],
         "size": f"{samples * facts.bits // 8 / 1e6:,.1f} MB in memory as stored, "
         f"{samples * 4 / 1e6:,.1f} MB as linear light",
@@ -215,6 +223,11 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         "views are": ("parallel" if math.isinf(focus) else f"converge {short(focus)} away")
         + assumed("focus_distance"),
     }
+    if facts.off_grid is not None:
+        rows, columns = facts.off_grid
+        lines["positions"] = (
+            f"{rows:.2g} (rows) and {columns:.2g} (columns) of a step off an even grid, by the names"
+        )
     if facts.metadata.said:
         lines["numbers"] = f"{facts.metadata.in_words}, as the pictures state"
     if facts.unknown:
@@ -222,7 +235,7 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
         keep = "; with --keep they are kept in the folder" if facts.files else ""
         lines["assumed"] = f"distances and blur depend on these assumptions: give {options} if you know them{keep}"
     if facts.missing:
-        lines["missing"] = _missing(facts.missing, facts.rows * facts.columns)
+        lines["missing"] = _missing(facts.missing, facts.rows * facts.columns, _FILLED)
     if facts.disparity_range is not None:
         low, highest = facts.disparity_range
         lines["disparities"] = f"{low:.3g} to {highest:.3g} pixels per view (stated)"
@@ -231,14 +244,19 @@ def _facts(facts: FolderInfo) -> dict[str, str]:
     return lines
 
 
-def _missing(places: Iterable[tuple[int, int]], total: int) -> str:
+_FILLED = (
+    "add them, or pass --missing fill, which renders them from the others by depth and estimates the error, or "
+    "--missing dark"
+)
+
+
+def _missing(places: Iterable[tuple[int, int]], total: int, way_out: str) -> str:
     missing = list(places)
     named = ", ".join(f"({row}, {column})" for row, column in missing[:_NAMED_AT_MOST])
     more = ", …" if len(missing) > _NAMED_AT_MOST else ""
     return (
         f"{len(missing)} of the {total} views, by (row, column): {named}{more}. A capture "
-        "raises an error, as it needs all views: add them, or open the others in Python with "
-        "vcc.formats.open_sparse_views"
+        f"raises an error: {way_out}"
     )
 
 

@@ -11,12 +11,14 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from cyclopts import Group, Parameter, Token
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import parse, short
+from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.cli.console import as_options, progress
 from vcc.formats import open_light_field
 from vcc.formats.orders import Order
@@ -28,6 +30,8 @@ from vcc.store import StoredLightField, StoredVideo, is_store, is_video, open_st
 
 MAKING = Group("Making the image", sort_key=2)
 READING = Group("Reading the light field", sort_key=3)
+
+Field = TypeVar("Field", LightField, StoredLightField)
 
 # --- values ---
 
@@ -51,6 +55,22 @@ def lengths(text: str, option: str) -> float | tuple[float, float]:
     if len(parts) > 2:
         raise InputError(f'{option} is "{text}": one length, or two with a comma between them')
     return parts[0] if len(parts) == 1 else (parts[0], parts[1])
+
+
+def wavelengths(text: str, option: str) -> tuple[float, ...]:
+    """Metres of wavelengths separated by commas; a unit is also that of those before it without one.
+
+    Raises:
+        InputError: no unit, or not wavelengths of light.
+    """
+    unit, found = "", []
+    for part in reversed(text.split(",")):
+        own = part.lstrip("+-.0123456789eE ")
+        unit = own or unit
+        if not unit:
+            raise InputError(f'{option} is "{text}": wavelengths end with a unit, such as "610, 540, 465 nm"')
+        found.append(parse(part if own else part + unit, "length", option))
+    return all_checked(option, found[::-1])
 
 
 def memory_size(text: str, option: str = "--memory-limit") -> int:
@@ -156,6 +176,10 @@ def quantity(
 
 Length = Annotated[float, quantity("LENGTH", length, written=short)]
 Lengths = Annotated[float | tuple[float, float], quantity("LENGTH", lengths, written=short)]
+Wavelengths = Annotated[
+    tuple[float, ...],
+    quantity("LENGTH,…", wavelengths, written=lambda given: ", ".join(short(each) for each in given)),
+]
 Whole = Annotated[int, quantity("NUMBER", whole_number)]
 Counts = Annotated[
     tuple[int, int], quantity("ROWS COLUMNS", whole_number, tokens=2, written=lambda two: "{} {}".format(*two))
@@ -285,16 +309,22 @@ class Reading(Arrangement, ViewCameras):
             linear, whatever the files state. A store contains linear light.
         orientation: Direction of rows and columns of views. auto checks it by parallax and corrects it; as-is
             uses the files as they are.
+        missing: Views that are missing in a folder's grid: fill renders them from the others by depth and reports
+            the estimated error; dark leaves them without light.
+        wavelengths: Wavelength of each channel, "610, 540, 465 nm", for cameras that depend on it. Default: stated
+            by the light field, if it is.
     """
 
     transfer: Literal["auto", "srgb", "linear", "as-is"] = "auto"
     orientation: Literal["auto", "as-is", "flip-rows", "flip-columns", "flip-both", "transpose"] = "auto"
+    missing: Literal["refuse", "fill", "dark"] = "refuse"
+    wavelengths: Wavelengths | None = None
 
     def light(self, path: Path) -> LightField | StoredLightField | StoredVideo:
         """As `light_field`, but a video is supported, too."""
         if not is_video(path):
             return self.light_field(path)
-        self._check_nothing_told(path)
+        self._check_nothing_told(path, "a video of stored light fields", but=("transfer",))
         return open_video(path)
 
     def light_field(self, path: Path) -> LightField | StoredLightField:
@@ -304,14 +334,23 @@ class Reading(Arrangement, ViewCameras):
             InputError: see `vcc.open_light_field`; a video; a store with camera options.
         """
         if is_store(path):
-            self._check_nothing_told(path)
-            return open_store(path)
+            self._check_nothing_told(path, "a store", but=("transfer", "wavelengths"))
+            return self._with_wavelengths(open_store(path))
+        told = {name: value for name, value in self.given().items() if name != "wavelengths"}
         with progress("Reading views") as advance:
-            return open_light_field(path, progress=advance, **self.given())
+            found = open_light_field(path, progress=advance, **told)
+        return self._with_wavelengths(found)
 
-    def _check_nothing_told(self, path: Path) -> None:
-        if names := given_options(self, but=("transfer",)):
-            raise InputError(f"{path} is a store, which states its cameras: leave out {', '.join(names)}")
+    def _with_wavelengths(self, found: Field) -> Field:
+        """The light field with the wavelengths that the user gave."""
+        if self.wavelengths is None:
+            return found
+        with checks.within("--wavelengths"):
+            return found.with_wavelengths(self.wavelengths)
+
+    def _check_nothing_told(self, path: Path, kind: str, but: tuple[str, ...]) -> None:
+        if names := given_options(self, but=but):
+            raise InputError(f"{path} is {kind}, which states its cameras: leave out {', '.join(names)}")
 
     def in_memory(self, path: Path) -> LightField:
         """The light field at a path, read into memory."""

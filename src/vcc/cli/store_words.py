@@ -50,6 +50,8 @@ def store_facts(stored: StoredLightField, quick: bool) -> dict[str, str]:
     }
     if stored.wavelengths is not None:
         lines["bands"] = as_text(stored.wavelengths).partition(" ")[2]
+    if stored.filling is not None and stored.filling.words:
+        lines["filled"] = stored.filling.words
     lines |= _assumed(stored.provenance)
     if stored.lossy is not None:
         lines["lossy"] = loss(stored.lossy)

@@ -25,7 +25,7 @@ from vcc.base.workers import Workers
 from vcc.engines import depth_kernels as kernels
 from vcc.fields.grid import Block, Grid
 from vcc.fields.samples import Samples
-from vcc.plan.depth_rule import ViewsBetween
+from vcc.plan.depth_rule import Parallax, ViewsBetween
 
 Array = NDArray[np.float32]
 
@@ -136,7 +136,7 @@ class DenserViews:
         view = self._source.read(replace(whole, rows=(row, row + 1), columns=(column, column + 1)))[0, 0]
         view = np.ascontiguousarray(view, dtype=np.float32 if view.dtype == np.float16 else view.dtype)
         nearness = self._nearness(row, column)
-        return _seen_as(view.reshape(*view.shape[:2], -1), nearness)
+        return seen_as(view.reshape(*view.shape[:2], -1), nearness)
 
     def _nearness(self, row: int, column: int) -> Array:
         """sign · disparity of a view: from its own map, or rendered from the nearest map."""
@@ -147,35 +147,57 @@ class DenserViews:
         nearest = int(np.argmin(np.abs(places - (row, column)).sum(axis=1)))
         known = np.ascontiguousarray(sign * maps.values[nearest])
         away = (row - places[nearest, 0], column - places[nearest, 1])
-        shown, _ = self._looked_from(_seen_as(known[..., None], known), away, (), 0, len(known))
-        return shown[..., 0]
+        return seen_from(self._between.parallax, known, away, self._threads)
 
     def _looked_from(
         self, view: View, away: tuple[float, float], others: Any, first: int, stop: int
     ) -> tuple[Array, int]:
-        """The image (rows, s, channels) from a place (down, across) views away, and the number of unseen pixels.
+        found = Looking(self._between.parallax, self._threads, view, away, first, stop)
+        found.complete(others)
+        return found.found.out, found.unseen()
 
-        ``others``: further views, with their distances and weights, for places that the first one does not show.
-        """
-        out = np.zeros((stop - first, *view.samples.shape[1:]), dtype=np.float32)
-        found = Found(first, out, *np.empty((3, *out.shape[:2]), dtype=np.float32))
-        with Workers(self._threads) as pool:
-            self._look(pool, view, away, 1.0, False, found)
-            if (found.seen < 0).any():
-                for other, distance, weight in others:
-                    self._look(pool, other, distance, weight, True, found)
-        return out, int(kernels.share_out(out, found.seen))
 
-    def _look(
-        self,
-        pool: Workers,
-        view: View,
-        away: tuple[float, float],
-        weight: float,
-        torn_only: bool,
-        found: Found,
+def seen_from(parallax: Parallax, nearness: Array, away: tuple[float, float], threads: int) -> Array:
+    """A map of nearness, sign · disparity, as seen from a place (down, across) views away."""
+    looking = Looking(parallax, threads, seen_as(nearness[..., None], nearness), away, 0, len(nearness))
+    looking.unseen()
+    return np.ascontiguousarray(looking.found.out[..., 0])
+
+
+class Looking:
+    """Rows of the image from a place between views.
+
+    Args:
+        parallax: of the light field.
+        threads: number of threads.
+        view: the view nearest to the place.
+        away: (down, across), views from there to the place.
+        first: first row of the image.
+        stop: the row after the last.
+    """
+
+    def __init__(
+        self, parallax: Parallax, threads: int, view: View, away: tuple[float, float], first: int, stop: int
     ) -> None:
-        parallax, nearness = self._between.parallax, view.nearness
+        self._parallax, self._threads = parallax, threads
+        out = np.zeros((stop - first, *view.samples.shape[1:]), dtype=np.float32)
+        self.found = Found(first, out, *np.empty((3, *out.shape[:2]), dtype=np.float32))
+        with Workers(threads) as pool:
+            self._look(pool, view, away, 1.0, False)
+
+    def complete(self, others: Any) -> None:
+        """Add what the first view does not show from others, an iterable of (view, away, weight)."""
+        if (self.found.seen < 0).any():
+            with Workers(self._threads) as pool:
+                for other, distance, weight in others:
+                    self._look(pool, other, distance, weight, True)
+
+    def unseen(self) -> int:
+        """Number of pixels that no view shows; called once, at the end."""
+        return int(kernels.share_out(self.found.out, self.found.seen))
+
+    def _look(self, pool: Workers, view: View, away: tuple[float, float], weight: float, torn_only: bool) -> None:
+        parallax, nearness, found = self._parallax, view.nearness, self.found
         down, across = away
         way = Way(float(across), float(down), parallax.sign, parallax.along_v)
         bounds = kernels.march_bounds(view.ranges, way)
@@ -191,7 +213,7 @@ class DenserViews:
         list(pool.map(band, range(0, len(found.out), BAND)))
 
 
-def _seen_as(samples: NDArray[Any], nearness: Array) -> View:
+def seen_as(samples: NDArray[Any], nearness: Array) -> View:
     """A `View` from samples (t, s, channels) and nearness (t, s)."""
     return View(samples, nearness, kernels.tile_ranges(nearness))
 

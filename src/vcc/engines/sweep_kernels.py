@@ -52,7 +52,7 @@ def costs(
     Args:
         cross: rows of views, each with its middle view (levels, channels, t, s), blurred as by interpolation at
             fractions of a pixel 0 … ½.
-        tried: disparities along each row of views, pixels per view.
+        tried: disparities along each row of views and along the other axis, pixels per view, (planes, 2).
         guide: the middle view, (t, s); the window follows its borders.
         window: side of the window, pixels, an odd number.
         progress: called with (done, total).
@@ -67,7 +67,7 @@ def costs(
     def plane(n: int) -> None:
         total = np.zeros_like(guide)
         for (arm, soft), along in zip(cross, tried, strict=True):
-            total += _disagreement(arm, soft, float(along[n]))
+            total += _disagreement(arm, soft, float(along[n, 0]), float(along[n, 1]))
         a, b, sums = np.empty_like(guide), np.empty_like(guide), np.empty(guide.shape[1])
         _box(total, window, b, sums)
         _box(guide * total, window, a, sums)
@@ -120,27 +120,60 @@ def means_of_surfaces(disparity: Array, weights: Array) -> Array:
     return found
 
 
-def _disagreement(arm: Arm, soft: Array, disparity: float) -> Array:
-    """Difference of the better half of a row of views from its middle view at a disparity, (t, s)."""
-    views, middle = arm.views, arm.middle
+def _disagreement(arm: Arm, soft: Array, disparity: float, disparity_aside: float) -> Array:
+    """Difference of the better half of a row of views from the compared one at a disparity, (t, s)."""
+    views, across = arm.views, arm.axis == 2
     best = np.full(views.shape[2:], np.inf, np.float32)
     around, sums = np.empty_like(best), np.empty(views.shape[-1])
-    for side in (range(middle), range(middle + 1, len(views))):
-        if not side:
+    steps = arm.places
+    for side in (np.flatnonzero(steps[:, 0] < 0), np.flatnonzero(steps[:, 0] > 0)):
+        if not len(side):
             continue
         total = np.zeros_like(best)
         for n in side:
-            shift = -disparity * (n - middle)
-            whole = math.floor(shift)
-            weights = np.array(cubic_weights(shift - whole), np.float32)
-            # Interpolation blurs noise, most between pixels: without equal blur of the middle view, disparities
+            view, aside = views[n], -disparity_aside * steps[n, 1]
+            if aside:
+                view = np.empty_like(view)
+                _move(views[n], *_taps(aside), not across, view)
+            shift = -disparity * steps[n, 0]
+            whole, weights = _taps(shift)
+            # Interpolation blurs noise, most between pixels: without equal blur of the compared view, disparities
             # that fall there seem to fit better.
             alike = soft[round(2 * (len(soft) - 1) * abs(shift - round(shift)))]
-            _add_difference(views[n], alike, whole, weights, arm.axis == 2, total)
+            _add_difference(view, alike, whole, weights, across, total)
         total /= np.float32(len(side) * views.shape[1])
         _box(total, AROUND, around, sums)
         np.minimum(best, around, out=best)
     return best
+
+
+def _taps(shift: float) -> tuple[int, Array]:
+    """Whole pixels of a shift, and the weights of the four pixels around the rest."""
+    whole = math.floor(shift)
+    return whole, np.array(cubic_weights(shift - whole), np.float32)
+
+
+@_compiled
+def _move(view, whole, weights, across, moved):  # type: ignore[no-untyped-def]
+    """A view shifted by ``whole`` pixels and interpolated along one axis; borders repeated."""
+    channels, rows, columns = view.shape
+    w0, w1, w2, w3 = weights[0], weights[1], weights[2], weights[3]
+    for c in range(channels):
+        for y in range(rows):
+            q = y + whole
+            r0, r1 = min(max(q - 1, 0), rows - 1), min(max(q, 0), rows - 1)
+            r2, r3 = min(max(q + 1, 0), rows - 1), min(max(q + 2, 0), rows - 1)
+            for x in range(columns):
+                if across:
+                    p = x + whole
+                    value = w0 * view[c, y, min(max(p - 1, 0), columns - 1)]
+                    value += w1 * view[c, y, min(max(p, 0), columns - 1)]
+                    value += w2 * view[c, y, min(max(p + 1, 0), columns - 1)]
+                    value += w3 * view[c, y, min(max(p + 2, 0), columns - 1)]
+                else:
+                    value = w0 * view[c, r0, x] + w1 * view[c, r1, x]
+                    value += w2 * view[c, r2, x] + w3 * view[c, r3, x]
+                moved[c, y, x] = value
 
 
 @_compiled

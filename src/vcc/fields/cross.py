@@ -40,16 +40,27 @@ class Views(Protocol):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Arm(Brief):
-    """The middle row or the middle column of views, prepared for matching.
+    """Views on both sides of one, prepared for matching: the middle row or column of a grid, or scattered views.
 
     Args:
         views: (views, channels, t, s), the square roots of radiance relative to its bright part. The square root
             makes photon noise uniform, and shadows count like highlights.
         along: the axis of views, ``"u"`` for a row, ``"v"`` for a column.
+        steps: place of each view relative to the one that they are compared with, in views along this axis and
+            along the other one, (views, 2); None for all views of a row or column, relative to its middle one.
     """
 
     views: Array
     along: Axis
+    steps: NDArray[np.float64] | None = None
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """``steps``, also of a row or column."""
+        if self.steps is not None:
+            return self.steps
+        along = np.arange(len(self.views)) - float(self.middle)
+        return np.stack([along, np.zeros_like(along)], axis=1)
 
     @property
     def middle(self) -> int:

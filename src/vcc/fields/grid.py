@@ -18,6 +18,7 @@ from vcc.base.values import Value
 from vcc.base.wavelengths import as_text
 from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.disparity import Disparities, scaled
+from vcc.fields.filling import Filling
 from vcc.fields.parallax import Axis
 from vcc.fields.sampled import LIGHT_FIELD_AXES, Index, indices
 
@@ -92,6 +93,7 @@ class Grid(Value):
             light field has beyond the piece.
         wavelengths: in the middle of each channel's band, metres; of a light field without an axis of channels,
             one. None where not stated.
+        filling: which views were not recorded, see `vcc.fields.filling.Filling`; None if all were.
     """
 
     shape: tuple[int, ...]
@@ -103,9 +105,14 @@ class Grid(Value):
     extent: tuple[float, float] = (0.0, 0.0)
     beyond: Beyond = ALL
     wavelengths: tuple[float, ...] | None = None
+    filling: Filling | None = None
 
     def __post_init__(self) -> None:
         check_frame(self.frame)
+        if self.filling is not None and self.filling.given.shape != tuple(self.shape[:2]):
+            raise InputError(
+                f"filling is for {self.filling.given.shape} views, and this light field has {self.shape[:2]}"
+            )
         if self.wavelengths is not None:
             checked = all_checked("wavelengths of a light field", self.wavelengths, self.channels or 1)
             object.__setattr__(self, "wavelengths", checked)
@@ -116,6 +123,11 @@ class Grid(Value):
     def channels(self) -> int | None:
         """Number of colour channels; None without a channel axis."""
         return self.shape[4] if len(self.shape) == 5 else None
+
+    @property
+    def given(self) -> NDArray[np.bool_]:
+        """Whether each view was recorded, (rows, columns); False for views that were filled or left dark."""
+        return np.ones(self.shape[:2], np.bool_) if self.filling is None else self.filling.given
 
     @property
     def full_scale(self) -> float:
@@ -152,6 +164,7 @@ class Grid(Value):
             extent=(self.extent[0] / abs(v), self.extent[1] / abs(u)),
             beyond=tuple(map(_beyond, ranges[:4], self.shape[:4], self.beyond)),
             wavelengths=self.wavelengths if len(ranges) < 5 else self._wavelengths_of(ranges[4]),
+            filling=None if self.filling is None else self.filling.piece(ranges),
         ), ranges
 
     def of_channels(self, channels: Sequence[int]) -> Grid:
@@ -169,7 +182,7 @@ class Grid(Value):
         first = [before for before, _ in self.beyond]
         shape = tuple(n + sum(beyond) for n, beyond in zip(self.shape[:4], self.beyond, strict=True))
         corner = Affine.translation(*(-first[axis] for axis in LIGHT_FIELD_AXES))
-        return replace(self, shape=(*shape, *self.shape[4:]), frame=self.frame @ corner, beyond=ALL)
+        return replace(self, shape=(*shape, *self.shape[4:]), frame=self.frame @ corner, beyond=ALL, filling=None)
 
     @property
     def in_whole(self) -> Block:
@@ -258,8 +271,12 @@ class Grid(Value):
 
     @property
     def bands(self) -> str:
-        """The wavelengths as text, behind other words: ``", bands 465, 540, 610 nm"``; empty where unknown."""
-        return "" if self.wavelengths is None else f", {as_text(self.wavelengths)}"
+        """The wavelengths as text, behind other words: ``", bands 465, 540, 610 nm"``; empty where unknown.
+
+        Then the number of recorded views, if not all were.
+        """
+        recorded = "" if self.given.all() else f", {self.given.sum()} of {self.given.size} views recorded"
+        return recorded if self.wavelengths is None else f", {as_text(self.wavelengths)}{recorded}"
 
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.shape))

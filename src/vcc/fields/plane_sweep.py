@@ -12,6 +12,7 @@ disparity between steps, and averaging over the same surface smooths it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,7 +27,17 @@ from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
 from vcc.base.progress import Progress
 from vcc.base.version import VERSION
-from vcc.fields.cross import LARGEST_RANGE, MARGIN, Array, Views, arms, check_axes, cubic_weights, range_to_search
+from vcc.fields.cross import (
+    LARGEST_RANGE,
+    MARGIN,
+    Arm,
+    Array,
+    Views,
+    arms,
+    check_axes,
+    cubic_weights,
+    range_to_search,
+)
 from vcc.fields.disparity import DisparityMaps
 from vcc.fields.grid import Block, Grid
 from vcc.fields.sampled import to_numpy
@@ -102,13 +113,40 @@ def plane_sweep(
     # At least three steps: a parabola needs neighbours.
     tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
     cross = arms(light_field)
-    rows, columns = grid.shape[2:4]
+    return sweep_of(cross, cross[0].views[cross[0].middle], grid, tried, window, memory_limit, progress)
+
+
+def sweep_of(
+    cross: Sequence[Arm],
+    compared: Array,
+    grid: Grid,
+    tried: NDArray[np.float64],
+    window: int = WINDOW,
+    memory_limit: int | None = None,
+    progress: Progress | None = None,
+) -> Swept:
+    """The disparity at which the views of one or more arms agree best with one view, for each pixel.
+
+    Args:
+        cross: views on both sides of the compared one.
+        compared: this view, (channels, t, s), on the scale of the arms.
+        grid: of the views, which converts disparities along u to those along v.
+        tried: disparities along u, at least three, evenly spaced.
+        window: see `plane_sweep`.
+        memory_limit: see `plane_sweep`.
+        progress: see `plane_sweep`.
+
+    Raises:
+        InputError: more memory needed than allowed.
+    """
+    rows, columns = compared.shape[1:]
     needed = 4 * (rows * columns * (2 * len(tried) + 24) + 3 * sum(arm.views.size for arm in cross))
     what = f"a sweep of {len(tried)} disparities over {rows}×{columns} pixels"
     check_memory(needed, memory_limit, what, "give a part of the light field")
-    softened = [(arm, _as_if_moved(arm.views[arm.middle], arm.axis)) for arm in cross]
-    along = [np.array([grid.disparities_along(arm.along, one) for one in tried], float) for arm in cross]
-    guide = cross[0].views[cross[0].middle].mean(axis=0)
+    softened = [(arm, _as_if_moved(compared, arm.axis)) for arm in cross]
+    by_axis = {axis: np.asarray(grid.disparities_along(axis, tried), float) for axis in ("u", "v")}
+    along = [np.stack([by_axis[arm.along], by_axis["v" if arm.along == "u" else "u"]], axis=1) for arm in cross]
+    guide = compared.mean(axis=0)
     kernels = lazy_import.module("vcc.engines.sweep_kernels")
     costs = kernels.costs(softened, along, guide, window, progress)
     step = float(tried[1] - tried[0])
@@ -181,14 +219,20 @@ def _first_look(
     found = plane_sweep(_Coarser(light_field, factor), coarse, step=step, memory_limit=memory_limit)
     at_an_end = ((found.disparity <= coarse[0]) | (found.disparity >= coarse[1])) & (found.confidence > 0)
     lost = float(((found.disagreement > UNMATCHED) | at_an_end).mean())
+    low, high = ends_of(found)
+    return (factor * low, factor * high), lost
+
+
+def ends_of(found: Swept) -> tuple[float, float]:
+    """(lowest, highest) disparity of a sweep, weighted by confidence, without outliers; (inf, −inf) if unknown."""
     order = np.argsort(found.disparity, axis=None)
     sure = np.maximum(found.confidence - _UNSURE, 0)
     share = np.cumsum((sure if sure.any() else found.confidence).ravel()[order], dtype=np.float64)
     if share[-1] == 0:
-        return (math.inf, -math.inf), lost
+        return math.inf, -math.inf
     places = np.searchsorted(share, share[-1] * np.array([_OUTERMOST, 1 - _OUTERMOST]))
-    low, high = factor * found.disparity.ravel()[order[places]].astype(np.float64)
-    return (float(low), float(high)), lost
+    low, high = found.disparity.ravel()[order[places]].astype(np.float64)
+    return float(low), float(high)
 
 
 @dataclass(frozen=True, eq=False)

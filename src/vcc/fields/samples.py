@@ -10,6 +10,7 @@ from typing import Any, Protocol, Self, get_args
 
 import numpy as np
 from array_api_compat import array_namespace, is_array_api_obj
+from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.cached import cached
@@ -17,6 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import Shown
 from vcc.fields.disparity import Disparities, DisparityMaps
+from vcc.fields.filling import Filling
 from vcc.fields.grid import (
     ALL,
     SAMPLES_IN_WORDS,
@@ -78,6 +80,16 @@ class OnGrid(Shown, ABC):
         return self.grid.full_scale
 
     @property
+    def given(self) -> NDArray[np.bool_]:
+        """Whether each view was recorded, (rows, columns); False for views that were filled or left dark."""
+        return self.grid.given
+
+    @property
+    def filling(self) -> Filling | None:
+        """Estimated errors of views that were not recorded; None if all views were."""
+        return self.grid.filling
+
+    @property
     def whole_views(self) -> tuple[float, float]:
         """(rows, columns) of views of the light field of which this is a piece, in this piece's steps.
 
@@ -128,6 +140,7 @@ class InMemory(OnGrid):
     extent: tuple[float, float] | None = None
     beyond: Beyond = ALL
     wavelengths: tuple[float, ...] | None = None
+    filling: Filling | None = None
 
     def __post_init__(self) -> None:
         check_shape(shape_of(self.values))
@@ -175,6 +188,7 @@ class InMemory(OnGrid):
             "extent": grid.extent,
             "beyond": grid.beyond,
             "wavelengths": grid.wavelengths,
+            "filling": grid.filling,
         }
         for name, part in parts.items():
             object.__setattr__(made, name, part)
@@ -195,6 +209,7 @@ class InMemory(OnGrid):
             self.extent or (0.0, 0.0),
             self.beyond,
             self.wavelengths,
+            self.filling,
         )
 
     @property

@@ -7,6 +7,7 @@ from vcc.formats.keeping import keep_geometry
 from vcc.formats.lytro_lfp import LytroRaw, read_lytro
 from vcc.formats.reading import open_light_field, open_sparse_views, read_geometry
 from vcc.formats.sparse import SparseViews
+from vcc.formats.unstructured import UnstructuredViews, open_unstructured
 from vcc.formats.writing import SavedLightField, save_light_field
 
 __all__ = [
@@ -15,9 +16,11 @@ __all__ = [
     "LytroRaw",
     "SavedLightField",
     "SparseViews",
+    "UnstructuredViews",
     "keep_geometry",
     "open_light_field",
     "open_sparse_views",
+    "open_unstructured",
     "read_container",
     "read_geometry",
     "read_ground_truth",

@@ -22,6 +22,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.wavelengths import wavelengths as all_checked
+from vcc.fields.filling import Filling
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
@@ -32,7 +33,7 @@ from vcc.formats.grid import Decoded, Geometry
 
 ENDINGS = (".npy", ".npz")
 
-_OWN = ("values", "frame", "transfer", "sample", "disparity_range", "wavelengths")
+_OWN = ("values", "frame", "transfer", "sample", "disparity_range", "wavelengths", "given", "error", "unseen")
 _MOST_LIKELY_CHANNELS = 4  # an axis this short is colour rather than the width of a picture
 _ORDER = "vutsc"
 _AGAIN = "Copy it again from where it came from"
@@ -86,6 +87,7 @@ def read(
             disparity_range=_disparity_range(arrays.get("disparity_range"), path),
             sample=_sample(arrays.get("sample"), path),
             wavelengths=_wavelengths(arrays.get("wavelengths"), values, path),
+            filling=_filling(arrays, values, path),
         ),
         frame=_frame(arrays.get("frame"), shape is None and axes is None, path),
     )
@@ -114,6 +116,8 @@ def save(light_field: Samples, path: str | PathLike[str]) -> Path:
         arrays["disparity_range"] = np.array(grid.disparity_range)
     if grid.wavelengths is not None:
         arrays["wavelengths"] = np.array(grid.wavelengths)
+    if grid.filling is not None:
+        arrays |= {name: getattr(grid.filling, name) for name in ("given", "error", "unseen")}
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
     return path
@@ -258,6 +262,16 @@ def _sample(stated: NDArray[Any] | None, path: Path) -> Sample:
     if stated.shape == () and stated.item() == "point":
         return "point"
     raise InputError(f'{path}: its "sample" is {stated.tolist()!r}; "mean" and "point" are known')
+
+
+def _filling(arrays: dict[str, NDArray[Any]], values: NDArray[Any], path: Path) -> Filling | None:
+    if "given" not in arrays:
+        return None
+    stated = {name: arrays[name].tolist() for name in ("given", "error", "unseen") if name in arrays}
+    filling = Filling.of_lists(stated, str(path))
+    if filling.given.shape != values.shape[:2]:
+        raise InputError(f"{path}: its filled views are of {filling.given.shape} views, not {values.shape[:2]}")
+    return filling
 
 
 def _wavelengths(stated: NDArray[Any] | None, values: NDArray[Any], path: Path) -> tuple[float, ...] | None:

@@ -13,6 +13,7 @@ from vcc.base.errors import InputError
 from vcc.base.progress import Progress, part_of
 from vcc.base.units import nm
 from vcc.base.wavelengths import wavelength
+from vcc.fields.filling import Filling
 from vcc.light_field import LightField
 
 _NAME = re.compile(r"(?:.*[_\s-])?(\d{2,5}(?:\.\d+)?)\s?nm", re.IGNORECASE)
@@ -59,6 +60,7 @@ def stacked(
         InputError: a folder with several channels, or another shape, type or geometry than the first.
     """
     values, first = [], None
+    filling: Filling | None = None
     for number, folder in enumerate(folders):
         one = opened(folder, part_of(progress, number, len(folders)))
         if one.channels not in (None, 1):
@@ -73,9 +75,15 @@ def stacked(
                 f"{folder} has samples of shape {samples.shape} and type {samples.dtype}, and {whole} "
                 f"{values[0].shape} and {values[0].dtype}: bands have the same views and pixels"
             )
+        elif not np.array_equal(one.given, first.given):
+            raise InputError(f"{folder} and {whole} have different views: bands have the same views and pixels")
         elif not one.frame.isclose(first.frame):
             raise InputError(f"{folder} states other cameras than {whole}: bands have the same spacing and slopes")
         values.append(samples)
+        if one.filling is not None:  # the largest error of all bands
+            worst = one.filling if filling is None else filling
+            error = np.maximum(worst.error, one.filling.error)
+            filling = Filling(one.given, error, np.maximum(worst.unseen, one.filling.unseen))
     assert first is not None
     with checks.within(str(next(iter(folders)).parent)):
         return LightField(
@@ -84,4 +92,5 @@ def stacked(
             first.disparity_range,
             first.sample,
             wavelengths=list(folders.values()),
+            filling=filling,
         )

@@ -129,7 +129,7 @@ def _names_of(grid: ViewGrid, name: re.Pattern[str]) -> dict[tuple[int, int], re
 
 
 def _stepped(names: dict[tuple[int, int], re.Match[str]], shape: tuple[int, int]) -> Geometry:
-    """Spacing and directions from the positions in names, in millimetres.
+    """Spacing, directions and deviations from an even grid, from the positions in names, in millimetres.
 
     Args:
         names: matched names of the existing views, from `_names_of`.
@@ -140,9 +140,17 @@ def _stepped(names: dict[tuple[int, int], re.Match[str]], shape: tuple[int, int]
         where[place] = float(match[4]), float(match[5])
     down, right = _mean_step(where[..., 0], 0), _mean_step(where[..., 1], 1)
     spacing = (abs(down) or abs(right), abs(right) or abs(down))  # a single row has no step down
+    off_grid = None
+    if spacing[0] > 0:
+        rows, columns = np.indices(shape)
+        off = (where - np.stack([rows * down, columns * right], axis=-1)) / spacing
+        off -= np.nanmean(off, axis=(0, 1))
+        rms = np.sqrt(np.nanmean(off**2, axis=(0, 1)))
+        off_grid = (float(rms[0]), float(rms[1]))
     return Geometry(
         spacing=(spacing[0] * mm, spacing[1] * mm) if spacing[0] > 0 else None,
         directions=(-1 if down < 0 else 1, -1 if right < 0 else 1),
+        off_grid=off_grid,
     )
 
 

@@ -47,6 +47,9 @@ class FolderInfo(Brief):
         notices: notices of the format's reader, each a sentence.
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` unless the files state otherwise.
         metadata: metadata of the pictures of a folder.
+        off_grid: root mean square distance of stated camera positions from an even grid, in its steps along rows
+            and columns of views; None if the format states no positions.
+        wavelengths: of the channels, metres; None if not stated.
     """
 
     format: str
@@ -69,6 +72,8 @@ class FolderInfo(Brief):
     notices: tuple[str, ...] = ()
     sample: Sample = "mean"
     metadata: ViewsWithMetadata = field(default_factory=lambda: ViewsWithMetadata({}, None))
+    off_grid: tuple[float, float] | None = None
+    wavelengths: tuple[float, ...] | None = None
 
     @property
     def codes(self) -> tuple[Literal["as-is", "auto"], Literal["srgb", "linear"]]:
@@ -150,6 +155,8 @@ def _info(
         unknown=tuple(name for name, known in stated.items() if not known),
         files=(),
         directions=geometry.directions,
+        off_grid=geometry.off_grid,
+        wavelengths=geometry.wavelengths,
         sample=geometry.sample,
     )
 

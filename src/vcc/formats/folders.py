@@ -9,7 +9,7 @@ from pathlib import Path
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path
-from vcc.formats import cambridge, camera_names, hci, numbered, orders, rowcol, views_csv
+from vcc.formats import cambridge, camera_names, hci, numbered, orders, rowcol, unstructured, views_csv
 from vcc.formats.grid import Geometry, ViewGrid
 from vcc.formats.orders import Order, counted_from, running_numbers
 
@@ -52,6 +52,8 @@ def find_grid(
                 f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), not {views}"
             )
         return _with_cameras(grid, folder)
+    if views is None and order is None:
+        _refuse_poses(folder)
     counted = numbered.find(folder, views=views, order=order, sparse=sparse)
     if counted is not None:
         return _with_cameras(counted, folder)
@@ -132,6 +134,17 @@ def _check_shape(grid: ViewGrid, folder: Path, stated: tuple[int, int], name: st
         raise InputError(
             f"{folder} has a grid of {grid.shape[0]}×{grid.shape[1]} views ({grid.format}), and {name} "
             f"states {stated[0]}×{stated[1]}: its baseline would be wrong for them. Correct {name} or move it away"
+        )
+
+
+def _refuse_poses(folder: Path) -> None:
+    """Raise for photographs with poses: their numbers say nothing of a grid."""
+    if unstructured.recognised(folder) is not None:
+        raise InputError(
+            f"{folder} holds photographs with poses, which are on no grid yet: "
+            f'vcc.formats.open_unstructured("{folder}").on_grid() makes a light field of them (vcc info shows '
+            "how far "
+            "the cameras are from a grid)"
         )
 
 

@@ -16,6 +16,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.base.words import first_few
+from vcc.fields.filling import Filling
 from vcc.fields.grid import Sample
 
 PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
@@ -56,6 +57,9 @@ class Geometry:
         picture_shape: (rows, columns) required of the pictures.
         sample: meaning of a sample, see `vcc.LightField`; means over pixels unless a file states otherwise.
         wavelengths: of the channels, metres.
+        filling: views that were not recorded, if a file states it.
+        off_grid: root mean square distance of stated camera positions from an even grid, in its steps along rows
+            and columns of views.
     """
 
     spacing: tuple[float, float] | None = None
@@ -69,6 +73,8 @@ class Geometry:
     picture_shape: tuple[int, int] | None = None
     sample: Sample = "mean"
     wavelengths: tuple[float, ...] | None = None
+    filling: Filling | None = None
+    off_grid: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -234,5 +240,7 @@ def _refuse_missing(at: dict[tuple[int, int], Path], rows: range, columns: range
     raise InputError(
         f"{folder} has {len(at)} of the {total} views of its {length(rows)}×{length(columns)} grid; "
         f"{count} {'is' if count == 1 else 'are'} missing, by (row, column): {first_few(missing, count)}. A "
-        "light field needs all views: add the missing files, or open the others with vcc.formats.open_sparse_views"
+        'light field needs all views: add the missing files, or pass missing="fill" to render them from the '
+        "others "
+        'by depth, or missing="dark". vcc.formats.open_sparse_views opens only those that are there'
     )

@@ -40,6 +40,28 @@ def assumed_notice(info: FolderInfo, path: Path, stated: Geometry, assumed: Sequ
     )
 
 
+OFF_GRID = 0.05
+"""Distance of camera positions from an even grid, in its steps, above which there is a notice."""
+
+
+def off_grid_notice(info: FolderInfo, disparities: tuple[float, float] | None) -> str:
+    """Notice on stated camera positions that are on no even grid; empty if they nearly are.
+
+    Args:
+        info: content of the folder.
+        disparities: (lowest, highest), pixels per view; None if unknown.
+    """
+    off = max(info.off_grid or (0.0, 0.0))
+    if off <= OFF_GRID:
+        return ""
+    size = (
+        ""
+        if disparities is None
+        else f", by which objects are off by up to {off * max(map(abs, disparities)):.2g} pixels"
+    )
+    return f"by their names, the cameras are {off:.0%} of a step off an even grid (root mean square){size}"
+
+
 FAR_FROM_STATED = 0.2
 """Relative difference between given and stated values below which there is no notice: remeasured values differ."""
 

@@ -98,7 +98,10 @@ def _line(
     if missing and (not sparse or count > MOST_PLACES):
         named = (number for number in range(first, first + count * step, step) if number not in numbered)
         verb = "is" if missing == 1 else "are"
-        way_out = "Add them, or open the existing views with vcc.formats.open_sparse_views"
+        way_out = (
+            'Add them, or pass missing="fill" (rendered from the others) or "dark"; open_sparse_views opens the '
+            "existing ones"
+        )
         raise InputError(
             f"{folder} has {len(numbered)} of {count} numbered views; {missing} {verb} missing: "
             f"{first_few(named, missing)}. {way_out if not sparse else 'Is a number wrong?'}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -206,6 +207,18 @@ def _moved(values: NDArray[Any], step: str) -> NDArray[Any]:
     else:
         values = np.ascontiguousarray(values.swapaxes(0, 1))
     return values
+
+
+def places_after(
+    step: str, places: Iterable[tuple[int, int]], shape: tuple[int, int]
+) -> tuple[list[tuple[int, int]], tuple[int, int]]:
+    """Places of views, (row, column), and the shape of their grid after a step of `Moved`."""
+    rows, columns = shape
+    if step == "transpose":
+        return [(column, row) for row, column in places], (columns, rows)
+    if step == "flip-rows":
+        return [(rows - 1 - row, column) for row, column in places], shape
+    return [(row, columns - 1 - column) for row, column in places], shape
 
 
 def _reverse(values: NDArray[Any]) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import ResultWarning
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, part_of
 from vcc.base.reading import expanded, reading
 from vcc.fields import parallax
 from vcc.fields.disparity import Disparities
+from vcc.fields.filling import Missing
 from vcc.fields.grid import Grid
 from vcc.fields.samples import check_samples
 from vcc.files.transfer import decode
@@ -27,9 +29,9 @@ from vcc.formats.dark_views import dark_notice
 from vcc.formats.folder_info import FolderInfo, Given, cameras_for, info_of_file, info_of_grid
 from vcc.formats.folders import find_grid, towards_positions
 from vcc.formats.grid import Decoded, Geometry, ViewGrid
-from vcc.formats.notices import assumed_notice, overruled_notice, vergence_notice
+from vcc.formats.notices import assumed_notice, off_grid_notice, overruled_notice, vergence_notice
 from vcc.formats.orders import Order
-from vcc.formats.orientation import OrientationChoice, look, looked_at, rearranged
+from vcc.formats.orientation import Moved, OrientationChoice, look, looked_at, places_after, rearranged
 from vcc.formats.reading_views import read_views
 from vcc.formats.sparse import SparseViews
 from vcc.light_field import LightField
@@ -68,6 +70,11 @@ def read_geometry(
     """
     path = expanded(path)
     with reading(path, "a light field"):
+        if bands := bands_in(path):
+            of_each = {"views": views, "order": order, "sparse": sparse, "files_outside": files_outside, **options}
+            first = read_geometry(next(iter(bands)), **of_each)
+            kind = f"a folder for each band: {first.format}"
+            return replace(first, format=kind, channels=len(bands), wavelengths=tuple(bands.values()))
         if containers.container_of(path) is not None:
             return info_of_file(_decoded(path, views, order, None, _with(options, files_outside)))
         grid = find_grid(path, views, order, sparse=sparse, files_outside=files_outside, options=options)
@@ -84,6 +91,7 @@ def open_light_field(
     orientation: OrientationChoice = "auto",
     views: tuple[int, int] | None = None,
     order: Order | None = None,
+    missing: Missing = "refuse",
     files_outside: bool = False,
     progress: Progress | None = None,
     **options: Any,
@@ -116,6 +124,9 @@ def open_light_field(
         order: order in which views are counted: "row-major", "column-major", "serpentine" (every other row
             reversed), "serpentine-columns" or "chess" (all fields of one colour first), illustrated in
             docs/files.md. By default, running numbers are arranged so that neighbours differ least.
+        missing: views that are missing in a folder's grid: "refuse" raises an error; "fill" renders them from the
+            others by depth, with an estimate of the error; "dark" leaves them without light. ``given`` and
+            ``filling`` of the light field report them; see `vcc.formats.SparseViews.light_field`.
         files_outside: allow a ``views.csv`` to name files outside its folder (``../a.png``, ``/data/a.png``).
             Only for trusted lists: a list from elsewhere could name any of your pictures.
         progress: called as progress(done, total) after each picture.
@@ -127,7 +138,8 @@ def open_light_field(
     Warns:
         ResultWarning: an unknown quantity had to be assumed (see `read_geometry` for the defaults), the views
             were rearranged, parallel views show negative disparities, some views are nearly black (less than 2
-            % of the light of the brightest view), or a notice of the format's reader.
+            % of the light of the brightest view), views were filled or left dark, or a notice of the format's
+            reader.
 
     Raises:
         InputError: no such folder or file, no light field in it, missing views or two for one place, pictures
@@ -135,6 +147,7 @@ def open_light_field(
     """
     checks.one_of("transfer", transfer, get_args(Transfer))
     checks.one_of("orientation", orientation, get_args(OrientationChoice))
+    checks.one_of("missing", missing, get_args(Missing))
     path = expanded(path)
     given = Given(spacing, slope_per_pixel, focus_distance)
     with reading(path, "a light field"):
@@ -144,16 +157,25 @@ def open_light_field(
                 "orientation": orientation,
                 "views": views,
                 "order": order,
+                "missing": missing,
             }
             how |= {"files_outside": files_outside, **options, **vars(given)}
             return stacked(bands, lambda each, part: open_light_field(each, progress=part, **how), progress)
         if containers.container_of(path) is not None:
             decoded = _decoded(path, views, order, progress, _with(options, files_outside))
             opened = _opened_file(decoded, path, given, transfer)
+            light_field, remarks = _put_in_order(opened, path, orientation, given)
         else:
-            grid = find_grid(path, views, order, files_outside=files_outside, options=options)
-            opened = _opened_folder(grid, path, given, transfer, orientation, progress)
-        light_field, remarks = _put_in_order(opened, path, orientation, given)
+            some = missing != "refuse"
+            grid = find_grid(path, views, order, sparse=some, files_outside=files_outside, options=options)
+            if grid.missing:
+                sparse, said = _sparse(grid, path, given, transfer, orientation, part_of(progress, 0, 2))
+                light_field = sparse.light_field(missing, progress=part_of(progress, 1, 2))
+                assert light_field.filling is not None
+                remarks = (*said, light_field.filling.words)
+            else:
+                opened = _opened_folder(grid, path, given, transfer, orientation, progress)
+                light_field, remarks = _put_in_order(opened, path, orientation, given)
     for remark in filter(None, remarks):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
     return light_field
@@ -173,7 +195,8 @@ def open_sparse_views(
 ) -> SparseViews:
     """Open the existing views of a folder with an incomplete grid; for the arguments see `open_light_field`.
 
-    The views keep the order of the files: parallax is not checked.
+    The views keep the order of the files: parallax is not checked. `SparseViews.light_field` fills the grid, as
+    does ``open_light_field(path, missing="fill")``, which checks parallax.
 
     Warns:
         ResultWarning: an unknown quantity had to be assumed, or some views are nearly black.
@@ -186,19 +209,59 @@ def open_sparse_views(
     given = Given(spacing, slope_per_pixel, focus_distance)
     with reading(path, "views of a light field"):
         grid = find_grid(path, views, order, sparse=True, files_outside=files_outside)
-        info = info_of_grid(grid)
-        cameras = cameras_for(info, grid.geometry, given, path)
-        assert cameras is not None  # folders never state a frame
-        pictures = read_views(
-            grid.present, info.picture_shape, _STORED[info.bits], **_how_stored(info, transfer), progress=progress
-        )
-    assumed = [name for name in info.unknown if name not in given.names]
-    dark = dark_notice(dict(zip(grid.present, pictures, strict=True)))
-    said = (assumed_notice(info, path, grid.geometry, assumed), overruled_notice(info, given), dark)
+        sparse, said = _sparse(grid, path, given, transfer, "as-is", progress)
     for remark in filter(None, said):
         warnings.warn(f"{path}: {remark}", ResultWarning, stacklevel=2)
-    frame = cameras.frame((*grid.shape, *info.picture_shape))
-    return SparseViews(pictures, tuple(grid.present), grid.shape, frame, info.disparity_range, info.sample)
+    return sparse
+
+
+def _sparse(
+    grid: ViewGrid,
+    path: Path,
+    given: Given,
+    transfer: Transfer,
+    orientation: OrientationChoice,
+    progress: Progress | None,
+) -> tuple[SparseViews, tuple[str, ...]]:
+    """The existing views of an incomplete grid in the requested order, and notices."""
+    grid, turned = towards_positions(grid) if orientation == "auto" else (grid, "")
+    info = info_of_grid(grid)
+    cameras = cameras_for(info, grid.geometry, given, path)
+    assert cameras is not None  # folders never state a frame
+    pictures = read_views(
+        grid.present, info.picture_shape, _STORED[info.bits], **_how_stored(info, transfer), progress=progress
+    )
+    if info.bits == 32:
+        check_samples(pictures)
+
+    def made(places: Iterable[tuple[int, int]], shape: tuple[int, int], cameras: Cameras) -> SparseViews:
+        frame = cameras.frame((*shape, *info.picture_shape))
+        seen = info.disparity_range if orientation in ("auto", "as-is") else None
+        stated = grid.geometry.wavelengths
+        return SparseViews(pictures, tuple(places), shape, frame, seen, info.sample, stated)
+
+    sparse = made(grid.present, grid.shape, cameras)
+    moved, vergence = Moved(), ""
+    around = sparse.around_a_view() if orientation == "auto" else None
+    if around is not None:
+        part, step = around
+        shown = parallax.disparity_range(part.values) if cameras.are_parallel else None
+        moved = rearranged(part.values, orientation, grid.geometry, None, None)[1]
+        vergence = vergence_notice(shown and (shown[0] / step, shown[1] / step)) if not moved.steps else ""
+    elif orientation == "auto":
+        moved = Moved(
+            notice="no view has neighbours on all sides: parallax was not checked, views are in file order"
+        )
+    else:
+        moved = rearranged(np.zeros((1, 1, 1, 1)), orientation, grid.geometry, None, None)[1]
+    for step_taken in moved.steps:
+        if step_taken == "transpose" and given.spacing is None:
+            cameras = cameras.turned()
+        sparse = made(*places_after(step_taken, sparse.places, sparse.shape), cameras)
+    assumed = [name for name in info.unknown if name not in given.names]
+    dark = dark_notice(dict(zip(sparse.places, pictures, strict=True)))
+    said = (assumed_notice(info, path, grid.geometry, assumed), overruled_notice(info, given), dark)
+    return sparse, (*info.notices, turned, moved.notice, *said, vergence)
 
 
 @dataclass
@@ -347,7 +410,17 @@ def _put_in_order(
     assert frame is not None  # a frame is stated if there are no cameras
     with checks.within(str(path)):
         stated = opened.geometry.wavelengths
-        grid = Grid(values.shape, frame, values.dtype, info.sample, disparity_range, shown, wavelengths=stated)
+        filling = None if opened.geometry.filling is None else opened.geometry.filling.moved(moved.steps)
+        grid = Grid(
+            values.shape,
+            frame,
+            values.dtype,
+            info.sample,
+            disparity_range,
+            shown,
+            wavelengths=stated,
+            filling=filling,
+        )
     light_field = LightField.of(values, grid)
     views = {(row, column): values[row, column] for row, column in np.ndindex(values.shape[:2])}
     remarks = (*info.notices, opened.notice, moved.notice, dark_notice(views))
@@ -356,7 +429,8 @@ def _put_in_order(
     assumed = [name for name in info.unknown if name not in given.names]
     vergence = vergence_notice(_shown(light_field, seen)) if cameras.are_parallel else ""
     said = (assumed_notice(info, path, opened.geometry, assumed), overruled_notice(info, given))
-    return light_field, (*remarks, *said, vergence)
+    off = off_grid_notice(info, _shown(light_field, seen)) if info.off_grid is not None else ""
+    return light_field, (*remarks, *said, vergence, off)
 
 
 def _shown(light_field: LightField, seen: _Seen) -> tuple[float, float] | None:

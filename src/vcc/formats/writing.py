@@ -132,6 +132,7 @@ def save_light_field(
             raise InputError(f'{path}: {option}= is not supported by the format "{chosen}", which {takes}')
     if chosen in ("hci", "views"):
         saved: SavedLightField = writer(light_field, path, kind=chosen, progress=progress, **options)
+        _warn_of_filling(light_field.grid, path, chosen)
         return saved
     if chosen in ("eslf", "mosaic"):
         options["kind"] = chosen
@@ -144,6 +145,7 @@ def save_light_field(
     else:
         writer(light_field, path, **options)
         saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, _HOW[chosen]))
+    _warn_of_filling(light_field.grid, path, chosen)
     if light_field.grid.sample != "mean" and chosen in ("eslf", "mosaic", "mp4"):
         warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
     tell(progress, 1, 1)
@@ -259,6 +261,17 @@ _WRITERS: dict[Kind, Callable[..., Any]] = {
 def _words(grid: Grid, path: Path, more: str) -> str:
     rows, columns, height, width = grid.shape[:4]
     return f"{path}: {rows}×{columns} views of {width}×{height} pixels, {more}"
+
+
+def _warn_of_filling(grid: Grid, path: Path, kind: Kind) -> None:
+    if grid.filling is not None and grid.filling.words and kind not in ("zarr", "npz"):
+        warnings.warn(
+            f"{path}: the format does not keep which views were recorded ({(~grid.given).sum()} of "
+            f"{grid.given.size} "
+            "were not): .zarr and .npz do",
+            ResultWarning,
+            stacklevel=3,
+        )
 
 
 def _warn_of_clipping(path: Path, clipped: float, exposure: Exposure) -> None:

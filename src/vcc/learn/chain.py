@@ -9,7 +9,7 @@ the heights of a plate), the transposes of these linear maps are used, all at on
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +21,6 @@ from vcc.base.errors import InputError
 from vcc.fields.grid import Grid
 from vcc.learn.parameters import CONTENT, Parameter, parameter, put, read
 from vcc.learn.scales import scale
-from vcc.optics.bands import refuse
 from vcc.optics.train import Train
 from vcc.plan.choice import Choices, Computed, compute, decide
 from vcc.plan.following import Linear, Parts, differences, plan_again
@@ -37,6 +36,8 @@ Numbers = dict[str, Array]
 
 STEP = 1e-5
 """Step of the differences, relative to a change of 1 (`vcc.learn.scales`): it moves light by 1e-4 pixels."""
+REVEALING = 1e-4
+"""Likewise, the step that reveals all dependent numbers."""
 MOST_BY_DIFFERENCES = 400
 """The largest size of a parameter that is differentiated by differences, which need two plans per number."""
 
@@ -49,6 +50,7 @@ class Chain:
         grid: of the light field.
         how: the settings; None uses the defaults.
         names: of the parameters (`vcc.learn.parameters`).
+        seen: from the camera to the train whose plan it is; None: the camera itself.
 
     Attributes:
         train: as given.
@@ -63,9 +65,16 @@ class Chain:
             across a hard edge, its numbers are not smooth in it, or it is too large.
     """
 
-    def __init__(self, train: Train, grid: Grid, how: How | None = None, names: Iterable[str] = ()) -> None:
-        refuse(train, "learning")
+    def __init__(
+        self,
+        train: Train,
+        grid: Grid,
+        how: How | None = None,
+        names: Iterable[str] = (),
+        seen: Callable[[Train], Train] | None = None,
+    ) -> None:
         self.train, self.grid, self.how = train, grid, how or How()
+        self.seen: Callable[[Train], Train] = seen or _itself
         self.names = tuple(names)
         self._parts = Parts()
         with self._parts.keeping():
@@ -153,11 +162,11 @@ class Chain:
     def _decided(self, train: Train) -> Choices:
         """The choices for a plan; elements that move along the axis may leave the plane of the views."""
         moving = (parameter(self.train, name) for name in self.names if name.endswith(".z"))
-        return decide(train, self.grid, self.how, [found.owned_by for found in moving], self._parts)
+        return decide(self.seen(train), self.grid, self.how, [found.owned_by for found in moving], self._parts)
 
     def _computed(self, train: Train) -> Computed:
         """The plan with these choices."""
-        return compute(train, self.grid, self.how, self.choices, self._parts)
+        return compute(self.seen(train), self.grid, self.how, self.choices, self._parts)
 
     def _at(self, values: Values) -> _Made:
         """The plan for some values, and its numbers; expensive parts are kept for similar plans."""
@@ -250,6 +259,29 @@ class Chain:
                 )
 
 
+def following(chain: Chain, name: str) -> Collection[str]:
+    """The numbers of the plan (`vcc.plan.model.Plan.parameters`) that depend on a parameter.
+
+    Args:
+        chain: from parameters to plans, when learning begins.
+        name: of the parameter.
+
+    Raises:
+        InputError: the numbers do not follow the parameter.
+    """
+    here = read(chain.train, name)
+    # A different step for each number, so that changes do not cancel.
+    some = REVEALING * scale(chain.train, name) * np.random.default_rng(0).uniform(0.5, 1.0, here.shape)
+    start = chain.plan().parameters()
+    for moved in (here + some, here - some):
+        try:
+            numbers = chain.plan({name: moved}).parameters()
+        except InputError:  # at a limit of the element or of the choices
+            continue
+        return [number for number, value in numbers.items() if not np.array_equal(value, start[number])]
+    return chain.followed()[name]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class _Made(Brief):
     """A plan for some values.
@@ -280,6 +312,10 @@ class _Made(Brief):
             return np.zeros(read(self.train, name).shape)
         listed = [weights.get(number, np.zeros(self.numbers[number].shape)) for number in numbers]
         return np.asarray(linear.back(_held(parameter(self.train, name))[0], listed))
+
+
+def _itself(train: Train) -> Train:
+    return train
 
 
 def _held(found: Parameter) -> tuple[Any, str]:

@@ -161,7 +161,7 @@ class CameraFunction:
 
     def __reduce__(self) -> tuple[Any, ...]:
         work = self._work
-        return CameraFunction, (work.camera, work.light_field, work.chain.names, work.how)  # same choices
+        return CameraFunction, (work.camera, work.light_field, work.names, work.how)  # same choices
 
     # --- traced by JAX ---
 

@@ -20,14 +20,14 @@ from vcc.base.values import Unhashable, fingerprint
 from vcc.engines import abilities, chosen
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory, Samples
-from vcc.learn.chain import Chain
 from vcc.learn.parameters import put
+from vcc.learn.paths import Paths
 from vcc.learn.scales import scale
-from vcc.learn.verdicts import following
 from vcc.optics.train import Train
 from vcc.plan.how import OF_THE_RUN, How
 from vcc.plan.protocol import Gradient, Partial
 from vcc.run.backwards import Backwards
+from vcc.run.bands import Mixing, SomeChannels, bands_as_text, read_once
 from vcc.run.batches import rasters_each
 from vcc.run.drive import Drive
 
@@ -42,15 +42,15 @@ class Work:
         camera: at the last planning, or when learning began.
         light_field: used if no other samples are given.
         how: the settings.
-        chain: from parameters to plans and back.
-        followed: the numbers of the plan that depend on each parameter.
+        paths: from parameters to plans and back, and to the weights of the plans' images.
+        fields: the light field, or the channels of it that take each path.
     """
 
     camera: Train
     light_field: Samples
     how: How
-    chain: Chain
-    followed: Mapping[str, Collection[str]]
+    paths: Paths
+    fields: Sequence[Samples]
 
     @classmethod
     def of(cls, camera: Train, light_field: Samples, how: How, names: Sequence[str]) -> Work:
@@ -66,9 +66,16 @@ class Work:
                 f"the light field is a {type(whole).__module__}.{type(whole).__name__}, but must be a NumPy "
                 "array: pass light_field.replaced(numpy.asarray(values)), and these values as samples"
             )
-        chain = Chain(camera, light_field.grid, how, names)
-        Drive.of_linear(chain.plan(), light_field, how)
-        return cls(camera, light_field, how, chain, {name: following(chain, name) for name in names})
+        paths = Paths.of(camera, light_field.grid, how, names)
+        fields = parted(paths, light_field if len(paths.each) == 1 else read_once(light_field, how))
+        for path, field in zip(paths.each, fields, strict=True):
+            Drive.of_linear(path.chain.plan(), field, how)
+        return cls(camera, light_field, how, paths, fields)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the parameters."""
+        return self.paths.names
 
     def planned_for(self) -> dict[str, str]:
         """Short hashes of the planner's inputs: equal hashes give equal plans, except for the seed of rays.
@@ -79,23 +86,33 @@ class Work:
         disparities = None if how.scene_distance is not None else grid.measured_disparity_range()
         # Rounded: estimates of disparity differ in the last digits between machines.
         seen = disparities and [round(float(each), 3) for each in disparities]
+        bands = [grid.wavelengths] if self.camera.depends_on_bands else []
         decisive = [field.name for field in fields(How) if field.name not in (*OF_THE_RUN, "seed")]
         return {
             "camera": _reported(self.camera),
-            "light field": _reported(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen),
+            "light field": _reported(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen, *bands),
             "options": _reported({name: getattr(how, name) for name in decisive}),
         }
 
     @property
     def picture_shape(self) -> tuple[int, ...]:
         """(rows, columns[, channels]) of an image."""
-        return *self.camera.sensor.shape, *self.light_field.grid.shape[4:]
+        channels = self.camera.sensor.channels_of(self.light_field.grid.channels)
+        return *self.camera.sensor.shape, *(() if channels is None else (channels,))
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Work:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Work.of, (self.camera, self.light_field, self.how, self.chain.names)  # makes the same choices
+        return Work.of, (self.camera, self.light_field, self.how, self.names)  # makes the same choices
+
+
+def parted(paths: Paths, light_field: Samples) -> list[Samples]:
+    """The channels of a light field that take each path."""
+    return [
+        light_field if path.channels is None else SomeChannels.of(light_field, path.channels)
+        for path in paths.each
+    ]
 
 
 def _reported(*parts: Any) -> str:
@@ -190,20 +207,27 @@ def explained_while_learning(work: Work, arrays: Numbers, scales: Mapping[str, f
         scales: their units of storage, by name.
         plan_again: the code with which a user plans again.
     """
-    in_pictures = {name: arrays[name] for name in work.chain.names}
-    plan = work.chain.plan(in_pictures)
     learned = "\n".join(
         f"  {name}: {'×'.join(map(str, arrays[name].shape)) or 'a number'}, in steps of {step:.3g}"
         for name, step in scales.items()
     )
-    otherwise = work.chain.replanned(in_pictures)
+    said_of: list[str] = []
+    otherwise: dict[str, None] = {}
+    for path, field in zip(work.paths.each, work.fields, strict=True):
+        values = path.values(arrays)
+        otherwise |= dict.fromkeys(path.chain.replanned(values))
+        if not said_of:
+            train = path.chain.seen(put(work.camera, values))
+            said_of = [str(explained(train, field, path.chain.plan(values), work.how))]
+    if len(work.paths.each) > 1:
+        bands = bands_as_text(work.paths.each[0].channels or (), work.light_field.grid.wavelengths)
+        said_of.append(f"This is one of {len(work.paths.each)} plans: {bands}.")
     said = (
         "Planning again would decide as it was decided."
         if not otherwise
         else f"Planning again ({plan_again}) would decide otherwise: {', '.join(otherwise)}."
     )
-    parts = str(explained(put(work.camera, dict(arrays)), work.light_field, plan, work.how))
-    return "\n\n".join([parts, f"What is learned\n{learned or '  nothing'}", said])
+    return "\n\n".join([*said_of, f"What is learned\n{learned or '  nothing'}", said])
 
 
 class Call:
@@ -217,7 +241,7 @@ class Call:
 
     def __init__(self, work: Work, names: tuple[str, ...], several: Collection[str]) -> None:
         self.work, self.names, self.several = work, names, several
-        self.ahead: list[list[tuple[Drive, Partial | None]]] = []  # by light field and camera
+        self.ahead: list[list[list[tuple[Drive, Partial | None]]]] = []  # by light field, path and camera
 
     def made(self, samples: NDArray[Any] | None, numbers: Numbers) -> NDArray[np.floating]:
         """The images of one or several light fields by one or several cameras.
@@ -233,7 +257,8 @@ class Call:
             InputError: numbers that are invalid for an element, samples that are not finite.
         """
         self.begin(samples, numbers)
-        found = np.stack([self._pictures(n) for n in range(len(self.ahead))], axis=1)
+        mixings = [self.work.paths.mixing(one) for one in self._cameras(numbers)]
+        found = np.stack([self._pictures(n, mixings) for n in range(len(self.ahead))], axis=1)
         cameras = (found.shape[0],) if self.several else ()
         lead = () if samples is None else samples.shape[: samples.ndim - len(self.work.light_field.grid.shape)]
         return found.reshape(*cameras, *lead, *found.shape[2:])
@@ -249,12 +274,19 @@ class Call:
             InputError: numbers that are invalid for an element.
         """
         work = self.work
-        plans = [work.chain.plan(one) for one in self._cameras(numbers)]
-        fields = [work.light_field]
+        cameras = self._cameras(numbers)
+        plans = [[path.chain.plan(path.values(one)) for one in cameras] for path in work.paths.each]
+        fields = [work.fields]
         if samples is not None:
             kept = replace(work.light_field.grid, kind=samples.dtype)
-            fields = [InMemory.of(one, kept) for one in samples.reshape(-1, *kept.shape)]
-        self.ahead = [[(Drive.of_linear(plan, one, work.how), None) for plan in plans] for one in fields]
+            fields = [parted(work.paths, InMemory.of(one, kept)) for one in samples.reshape(-1, *kept.shape)]
+        self.ahead = [
+            [
+                [(Drive.of_linear(plan, field, work.how), None) for plan in of_path]
+                for of_path, field in zip(plans, of_field, strict=True)
+            ]
+            for of_field in fields
+        ]
 
     def _cameras(self, numbers: Numbers) -> list[dict[str, NDArray[np.float64]]]:
         """The numbers of each camera; of a single camera if no number has an axis of cameras."""
@@ -264,12 +296,16 @@ class Call:
             for n in range(count)
         ]
 
-    def _pictures(self, n: int) -> NDArray[np.floating]:
-        """The images of a light field by several plans, which share the reading of samples if possible."""
-        drives = [drive for drive, _ in self.ahead[n]]
-        found = rasters_each(drives)
-        self.ahead[n] = list(zip(drives, found, strict=True))
-        pictures = np.stack([drive.picture(each) for drive, each in zip(drives, found, strict=True)])
+    def _pictures(self, n: int, mixings: Sequence[Mixing | None]) -> NDArray[np.floating]:
+        """The images of a light field by several cameras, which share the reading of samples if possible."""
+        of_paths: list[list[Any]] = []
+        for number, ahead in enumerate(self.ahead[n]):
+            drives = [drive for drive, _ in ahead]
+            found = rasters_each(drives)
+            self.ahead[n][number] = list(zip(drives, found, strict=True))
+            of_paths.append([drive.picture(each) for drive, each in zip(drives, found, strict=True)])
+        by_camera = zip(mixings, zip(*of_paths, strict=True), strict=True)
+        pictures = np.stack([images[0] if mixing is None else mixing(images) for mixing, images in by_camera])
         if not np.isfinite(pictures).all():
             self.refuse()
         return pictures
@@ -280,8 +316,8 @@ class Call:
         Raises:
             InputError: always.
         """
-        for ahead in self.ahead:
-            values = ahead[0][0].given.whole()
+        for drive in (ahead[0][0] for of_field in self.ahead for ahead in of_field):
+            values = drive.given.whole()
             if values is not None:
                 checks.all_finite("samples", np.asarray(values))
         raise InputError("the image has values that are not finite: samples or parameters are too large")
@@ -297,27 +333,51 @@ class Call:
             wanted: names of parameters.
             numbers: of all parameters, as for the plans.
         """
-        chain, cameras = self.work.chain, self._cameras(numbers)
-        of_plan = {number for name in wanted for number in self.work.followed[name]}
+        cameras = self._cameras(numbers)
         lead = weights.ndim - len(self.work.picture_shape)
         each = weights.reshape(len(cameras), len(self.ahead), *weights.shape[lead:])
-        of_fields: list[Any] = [0] * len(self.ahead)
+        of_fields: list[Any] = [None] * len(self.ahead)
         pulled: list[dict[str, Any]] = []
         for n, one in enumerate(cameras):
-            total = Gradient()
-            for m, ahead in enumerate(self.ahead):
-                drive, found = ahead[n]
-                part = Backwards(drive, of_plan).gradient(each[n, m], samples_wanted=samples, found=found)
-                if samples:
-                    of_fields[m] = part.samples if n == 0 else of_fields[m] + part.samples
-                total = total + replace(part, samples=None)
-            pulled.append(chain.pull(one, total.gradients) if wanted else {})
+            mixing = self.work.paths.mixing(one)
+            gradients: dict[str, Any] = dict.fromkeys(wanted, 0.0)
+            mixed_by = [name for name in wanted if name in self.work.paths.mixed_by]
+            slopes: list[Any] = [0.0] * len(self.work.paths.each)
+            for number, path in enumerate(self.work.paths.each):
+                names = [name for name in wanted if name in path.followed]
+                of_plan = {followed for name in names for followed in path.followed[name]}
+                total = Gradient()
+                for m, ahead in enumerate(self.ahead):
+                    drive, found = ahead[number][n]
+                    given = each[n, m] if mixing is None else mixing.transposed(each[n, m], number)
+                    part = Backwards(drive, of_plan).gradient(given, samples_wanted=samples, found=found)
+                    if samples:
+                        of_fields[m] = self._added(of_fields[m], part.samples, path.channels)
+                    total = total + replace(part, samples=None)
+                    if mixing is not None and mixed_by:
+                        image = drive.picture(drive.rounds() if found is None else found)
+                        slopes[number] = slopes[number] + mixing.slopes(image, each[n, m], number)
+                for name, gradient in path.chain.pull(path.values(one), total.gradients, names).items():
+                    gradients[name] = gradients[name] + gradient
+            for name in mixed_by:
+                gradients[name] = gradients[name] + self.work.paths.pull(one, name, slopes)
+            pulled.append({name: gradients[name] + np.zeros(np.shape(one[name])) for name in wanted})
         return _stacked(of_fields) if samples else None, {
             name: np.stack([one[name] for one in pulled])
             if name in self.several
             else sum(one[name] for one in pulled)
             for name in wanted
         }
+
+    def _added(self, total: Any, part: Any, channels: tuple[int, ...] | None) -> Any:
+        """The gradient to all samples, with that of some channels added; a sum of one is not copied."""
+        grid = self.work.light_field.grid
+        if channels is None or grid.channels is None or channels == tuple(range(grid.channels)):
+            return part if total is None else total + part
+        total = np.zeros(grid.shape, part.dtype) if total is None else total
+        for place, channel in enumerate(channels or ()):
+            total[..., channel] += part[..., place]
+        return total
 
 
 def _stacked(arrays: list[Any]) -> Any:

@@ -6,7 +6,9 @@ learning rate of 0.01, moves light by about a tenth of a pixel.
 | what                                                    | a change of 1 is                                      |
 |---------------------------------------------------------|-------------------------------------------------------|
 | z, a length along the axis                              | 1 % of the way from the entrance plane to the sensor  |
-| a focal length, a period, a pitch, a refractive index   | 1 % of it                                             |
+| a focal length, a period, a pitch, a refractive index,  | 1 % of it                                             |
+| an Abbe number, a wavelength                            |                                                       |
+| Cauchy's B and C                                        | what changes the index by 0.01 at the d line          |
 | a place across the axis: decentre, offset, middle       | ten pixels                                            |
 | a slope: a prism's deflection, σ of a diffuser          | what moves light by ten pixels on the way to the      |
 |                                                         | sensor                                                |
@@ -27,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from vcc.base.wavelengths import D_LINE
 from vcc.learn.parameters import Parameter, parameter
 from vcc.optics import (
     Biprism,
@@ -39,7 +42,9 @@ from vcc.optics import (
     Pyramid,
 )
 from vcc.optics.electronics import Electronics
+from vcc.optics.glass import Abbe, Cauchy, Sellmeier, Table
 from vcc.optics.sensor import Sensor
+from vcc.optics.spectrum import Spectrum
 from vcc.optics.train import Train
 from vcc.shapes.kernels import Gaussian, Samples, TopHat
 from vcc.shapes.patterns import Cells, CosineSum
@@ -142,6 +147,14 @@ def _cubic(at: _At) -> float:
     return at.slope / (3 * at.radius**2)
 
 
+def _index_by_square(at: _At) -> float:
+    return OF_A_LENGTH * D_LINE**2
+
+
+def _index_by_fourth(at: _At) -> float:
+    return OF_A_LENGTH * D_LINE**4
+
+
 OWN: Mapping[tuple[type, str], Callable[[_At], float]] = {
     (FirstOrder, "length"): _along,
     (FirstOrder, "matrix"): _of_itself,
@@ -169,6 +182,15 @@ OWN: Mapping[tuple[type, str], Callable[[_At], float]] = {
     (Rough, "refractive_index"): _of_itself,
     (Cubic, "strength"): _cubic,
     (Electronics, "wavelength"): _itself,
+    (Cauchy, "A"): _of_itself,
+    (Cauchy, "B"): _index_by_square,
+    (Cauchy, "C"): _index_by_fourth,
+    (Sellmeier, "B"): _of_itself,
+    (Sellmeier, "C"): _of_itself,
+    (Abbe, "nd"): _of_itself,
+    (Abbe, "V"): _of_itself,
+    (Table, "indices"): _of_itself,
+    (Spectrum, "values"): _one,
 }
 """Rules for fields of a class and its subclasses."""
 BY_NAME: Mapping[str, Callable[[_At], float]] = {
@@ -180,6 +202,8 @@ BY_NAME: Mapping[str, Callable[[_At], float]] = {
     "offset": _across,
     "middle": _across,
     "rotation": _rotation,
+    "design_wavelength": _of_itself,
+    "wavelengths": _of_itself,
 }
 """Rules for fields by name, for any class."""
 

@@ -181,7 +181,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
     def _pictures(self, samples: torch.Tensor | None, values: Mapping[str, torch.Tensor] | None) -> torch.Tensor:
         numbers = self._numbers(values)
         given = None if samples is None else _as_samples(samples, self._work.light_field.grid)
-        in_pictures = {name: numbers[name] for name in self._work.chain.names}
+        in_pictures = {name: numbers[name] for name in self._work.names}
         shapes = {name: tuple(number.shape) for name, number in in_pictures.items()}
         several = several_of(shapes, {name: self._learned[name].shape for name in shapes})
         return pictures(self._work, given, in_pictures, several)
@@ -284,7 +284,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
         """
         work = self._work
         how = by_an_engine(How.of(work.how, options))
-        self._work = Work.of(self.camera(), work.light_field, how, work.chain.names)
+        self._work = Work.of(self.camera(), work.light_field, how, work.names)
 
     # --- the state ---
 
@@ -338,7 +338,7 @@ class CameraModule(torch.nn.Module):  # type: ignore[misc]
                 "differ. model.replan() plans again for the learned parameters"
             )
         if (there.camera, there.how) != (work.camera, work.how):
-            self._work = Work.of(there.camera, work.light_field, there.how, work.chain.names)
+            self._work = Work.of(there.camera, work.light_field, there.how, work.names)
 
     def extra_repr(self) -> str:
         """The learned parameters, and the size of the image."""

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 
 from vcc.base.errors import InputError
 
-STATE_THEM = "state one for each channel: light_field.with_wavelengths([610 * nm, 540 * nm, 465 * nm])"
+STATE_THEM = (
+    "state one for each channel: light_field.with_wavelengths([610 * nm, 540 * nm, 465 * nm]), or on the command "
+    'line --wavelengths "610, 540, 465 nm"'
+)
 """The way out where wavelengths are missing."""
 
 

@@ -48,14 +48,23 @@ def trains_of(train: Train, channels: int | None, wavelengths: tuple[float, ...]
     Raises:
         InputError: a band for which an element is not known, or a band with more than `MOST_WAYS` trains.
     """
-    count = channels or 1
     found: dict[Train, dict[int, float]] = {}
-    for channel in range(count):
-        band = Band(channel, count, None if wavelengths is None else wavelengths[channel])
+    for channel, band in enumerate(bands_of(channels, wavelengths)):
         for weight, one in ways_of(train, band):
             of_train = found.setdefault(one, {})
             of_train[channel] = of_train.get(channel, 0.0) + weight
     return [SameWay(one, tuple(weights), np.array(list(weights.values()))) for one, weights in found.items()]
+
+
+def bands_of(channels: int | None, wavelengths: tuple[float, ...] | None) -> list[Band]:
+    """The bands of a light field, in order.
+
+    Args:
+        channels: of the light field; None for one without an axis of channels.
+        wavelengths: one for each channel, metres, or None.
+    """
+    count = channels or 1
+    return [Band(n, count, None if wavelengths is None else wavelengths[n]) for n in range(count)]
 
 
 def ways_of(train: Train, band: Band) -> list[tuple[float, Train]]:

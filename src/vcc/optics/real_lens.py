@@ -260,16 +260,20 @@ class RealLens(Element):
         """
         distance = self._pupil_distance
         widest = None if seen is None else self._widest_seen(distance, seen)
-        if widest is None:
-            widest = self._widest(distance)
-        steps = math.ceil(math.log(widest) / math.log1p(PUPIL_STEP) + 0.5)
-        disc = Faces(transmission=Circle(2 * (1 + PUPIL_STEP) ** steps))
+        radius = self._exit_radius if widest is None else _rounded_up(widest)
+        disc = Faces(transmission=Circle(2 * radius))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
 
     def faces(self) -> Faces:
         """No faces: the effect of a thick element is between its planes; see `parts`."""
         return Faces()
+
+    @property
+    @cached
+    def _exit_radius(self) -> float:
+        """Radius of a disc in the exit pupil that all light leaving the lens passes, metres."""
+        return _rounded_up(self._widest(self._pupil_distance))
 
     @property
     @cached
@@ -311,7 +315,7 @@ class RealLens(Element):
         reach = 2 * self._stop_radius
         for _ in range(6):
             p, q, angle = np.meshgrid(
-                np.linspace(0, seen.radius, 9), np.linspace(0, reach, 61), np.linspace(0, np.pi, 25), indexing="ij"
+                np.linspace(0, seen.radius, 7), np.linspace(0, reach, 41), np.linspace(0, np.pi, 13), indexing="ij"
             )
             points = np.stack([p.ravel(), q.ravel(), angle.ravel()], axis=-1)
             widest = float(met(points).max())
@@ -320,7 +324,7 @@ class RealLens(Element):
             reach *= 2
         if widest <= 0:
             return None
-        return _refined(points, met, np.array([seen.radius / 8, reach / 60, np.pi / 24]))
+        return _refined(points, met, np.array([seen.radius / 6, reach / 40, np.pi / 12]))
 
     def _widest(self, distance: float) -> float:
         """The same for light that goes anywhere: rays from all over the stop in all directions."""
@@ -392,6 +396,8 @@ class RealLens(Element):
             words.append(f"stop {short(lens.stop_diameter)}")
             if math.isfinite(lens.f_number):
                 words.append(f"f/{lens.f_number:.3g}")
+        open_ones = sum(each.diameter is None and not each.stop for each in self.prescription.surfaces)
+        words += [f"{open_ones} surfaces without a clear diameter"] if open_ones else []
         words += ["a mask at its stop"] if self.mask is not None else []
         words += ["dispersion"] if self.depends_on_band else []
         words += [f"{self.radiometry} radiometry"]
@@ -416,12 +422,17 @@ class Seen:
 def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float:
     """The largest value of a function around the points of a grid where it is large, by repeated random steps."""
     draw, away = np.random.default_rng(0), met(points)
-    for _ in range(8):
-        best = np.argsort(away)[-40:]
+    for _ in range(7):
+        best = np.argsort(away)[-24:]
         points, away = points[best], away[best]
-        near = (points + draw.uniform(-1, 1, (60, *points.shape)) * step).reshape(-1, points.shape[1])
+        near = (points + draw.uniform(-1, 1, (32, *points.shape)) * step).reshape(-1, points.shape[1])
         points, away, step = np.concatenate([points, near]), np.concatenate([away, met(near)]), step / 2
     return float(away.max())
+
+
+def _rounded_up(radius: float) -> float:
+    """A power of 1 + PUPIL_STEP, one to two steps above a radius that random rays found, metres."""
+    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 1))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:

@@ -290,6 +290,8 @@ class Train(Value, Shown):
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
         for element, parts in met_in_order((*self.elements, *self._pixels)):
             if isinstance(element, RealLens):
+                if any(isinstance(later, RealLens) for later in self.elements[self.elements.index(element) + 1 :]):
+                    parts = replace(element, radiometry="paraxial").parts()  # the last lens weighs light by angle
                 parts = (*parts, *element.window(self._seen_from_sensor(element)))
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z

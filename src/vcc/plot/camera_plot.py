@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.units import mm
+from vcc.base.units import mm, nm
+from vcc.base.wavelengths import wavelengths as checked_wavelengths
 from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection
+from vcc.optics.band import Band
+from vcc.optics.bands import bands_of, ways_of
 from vcc.optics.train import Stage, Train
 from vcc.plot import style
 from vcc.plot.elements import Pen, draw_element, draw_sensor, magnification
@@ -50,6 +54,7 @@ def plot_camera(
     across: str = "x",
     rays: int | None = None,
     magnified: Axes | bool | None = None,
+    wavelengths: Sequence[float] | None = None,
     axes: Axes | None = None,
 ) -> Axes:
     """Draw a camera from the side: light travels to the right, the scene is on the left.
@@ -63,6 +68,9 @@ def plot_camera(
     An array of very many cells is drawn with fewer, larger ones (its label reports this), while rays bend as
     in the true cells. A magnified inset shows some true cells, the sensor's pixels and their rays.
 
+    If bands of light take different paths, the rays of one point are drawn for several of them, in the colours of
+    their wavelengths (of the spectrum from 400 to 700 nm). Elements are those of the design wavelength.
+
     Args:
         camera: what to draw.
         light_field: the rays fill its width on the entrance plane; without it they fill the first lens that has a
@@ -73,6 +81,8 @@ def plot_camera(
         rays: number per point; None uses 9, or 5 if diffusers split them.
         magnified: whether to draw a magnified inset of an array of cells next to a new figure's drawing, or
             the axes for it; None draws it on a new figure for arrays with cells too small to see.
+        wavelengths: of the bands, metres; None uses the shortest, the middle and the longest of the light field,
+            if it states wavelengths. In a band with several orders, its brightest is drawn.
         axes: where to draw; None makes a new figure.
 
     Returns:
@@ -94,11 +104,29 @@ def plot_camera(
     scattering = any(stage.faces.spread is not None for stage in camera.stages)
     rays = rays or (RAYS_THAT_SPLIT if scattering else RAYS)
     points = points_to_show(camera, object_distances, axis)
+    bands = _bands_to_show(camera, light_field, wavelengths)
+    points = points[:1] if bands else points
     start = -scene_length(camera, points)
-    paths = [
-        trace_point(camera, point, light_field, axis, OFF_AXIS_RAYS if point.offset else rays, start)
-        for point in points
+    fans = [
+        _Fan(camera, point, OFF_AXIS_RAYS if point.offset else rays, _colour(number), point.label)
+        for number, point in enumerate(points)
     ]
+    if bands:
+        labels = [f"{points[0].label}, {band.stated('a ray') / nm:.5g} nm" for band in bands]
+        # The first are the widest: where paths agree, all colours remain visible.
+        widths = np.linspace(2.7, 0.9, len(bands))
+        fans = [
+            _Fan(
+                _brightest(camera, band),
+                points[0],
+                rays,
+                _of_wavelength(band.stated("a ray")),
+                label,
+                float(width),
+            )
+            for band, label, width in zip(bands, labels, widths, strict=True)
+        ]
+    paths = [trace_point(fan.train, fan.point, light_field, axis, fan.rays, start) for fan in fans]
     half = half_height(camera, paths, axis)
     wanted = axes is None if magnified is None else magnified is not False
     array = _array_to_magnify(camera, axis, half, required=bool(magnified)) if wanted else None
@@ -112,16 +140,16 @@ def plot_camera(
     pen = Pen(axis, -half, half, 0.016 * (camera.sensor.z - start), axes)
     set_limits(axes, start, camera.sensor.z, half, across)
     draw_optical_axis(axes)
-    for number, (point, path) in enumerate(zip(points, paths, strict=True)):
-        draw_paths(axes, point.distance, path, axis, _colour(number))
+    for fan, path in zip(fans, paths, strict=True):
+        draw_paths(axes, fan.point.distance, path, axis, fan.colour, fan.width)
     for element in camera.elements:
         draw_element(pen, element, beam_at(element, paths, axis))
     draw_sensor(pen, camera.sensor)
     axes.legend(
-        handles=[Line2D([], [], color=_colour(number), label=point.label) for number, point in enumerate(points)],
+        handles=[Line2D([], [], color=fan.colour, label=fan.label) for fan in fans],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.16),
-        ncols=len(points),
+        ncols=len(fans),
         frameon=False,
         fontsize=style.SMALL,
         handlelength=1.5,
@@ -132,6 +160,67 @@ def plot_camera(
         _draw_magnified(beside, axes, camera, array, points, light_field, axis)
     draw_labels(pen, camera, own_figure)
     return axes
+
+
+# --- bands of light ---
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Fan(Brief):
+    """Rays of a point, in a colour.
+
+    Args:
+        train: that they take.
+        point: where they come from.
+        rays: number of them.
+        colour: of the rays.
+        label: in the legend.
+        width: of the lines, points.
+    """
+
+    train: Train
+    point: Point
+    rays: int
+    colour: Any
+    label: str
+    width: float = 1.1
+
+
+def _bands_to_show(
+    camera: Train, light_field: InMemory | None, wavelengths: Sequence[float] | None
+) -> Sequence[Band]:
+    """The bands whose rays are drawn; none if all take the same path."""
+    if wavelengths is not None:
+        given = checked_wavelengths("wavelengths", wavelengths)
+        return bands_of(len(given), given)
+    grid = None if light_field is None else light_field.grid
+    if grid is None or grid.wavelengths is None or not camera.depends_on_bands:
+        return ()
+    bands = sorted(bands_of(grid.channels, grid.wavelengths), key=lambda band: band.stated("a ray"))
+    some = [bands[0], bands[len(bands) // 2], bands[-1]] if len(bands) > 2 else bands
+    lit = [band for band in some if ways_of(camera, band)]
+    return lit if len({_brightest(camera, band) for band in lit}) > 1 else ()
+
+
+def _brightest(camera: Train, band: Band) -> Train:
+    """The train that most light of a band takes.
+
+    Raises:
+        InputError: nothing of the band passes.
+    """
+    ways = ways_of(camera, band)
+    if not ways:
+        raise InputError(
+            f"no light of {band.stated('a ray') / nm:.5g} nm passes this camera: draw other wavelengths"
+        )
+    return max(ways, key=lambda way: way[0])[1]
+
+
+def _of_wavelength(wavelength: float) -> Any:
+    """A colour of the spectrum, blue at 400 nm and red at 700 nm and beyond."""
+    from matplotlib import colormaps
+
+    return colormaps["turbo"](0.05 + 0.9 * float(np.clip((wavelength / nm - 400) / 300, 0, 1)))
 
 
 # --- drawing ---

@@ -162,6 +162,7 @@ def trace_point(
     axis: int,
     rays: int,
     start: float,
+    within_rim: bool = False,
 ) -> Paths:
     """The fan from a point; it starts at the point itself if that is in the drawing.
 
@@ -172,8 +173,13 @@ def trace_point(
         axis: 0 for x, 1 for y.
         rays: number of rays.
         start: of the drawing, metres, 0 or less.
+        within_rim: whether a fan that fills the light field is limited to what the first lens with a rim passes.
     """
     low, high = _entrance(camera, point, light_field, axis)
+    if within_rim and light_field is not None and any(True for _ in openings(camera, axis)):
+        least, most = _entrance(camera, point, None, axis)
+        if max(low, least) < min(high, most):
+            low, high = max(low, least), min(high, most)
     bundle = fan(np.linspace(low, high, rays), point.distance, point.offset, axis)
     return trace(camera, bundle, max(start, -point.distance), split_along=axis)
 

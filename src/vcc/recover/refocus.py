@@ -21,6 +21,8 @@ from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Element, Lens, Mask
 from vcc.optics.sensor import Sensor
+from vcc.plan.choice import compile_best
+from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import AlongAxes, Blur
 from vcc.shapes import patterns
@@ -155,7 +157,7 @@ def refocused(
     values = taken.to_numpy().astype(np.float64)
     values /= share if values.ndim == 2 else share[..., None]
     if sharp:
-        plan = camera.compile(light_field, **(options | {"interpolation": "sharp"}))
+        plan = compile_best(camera, light_field.grid, How.of(None, options | {"interpolation": "sharp"}))
         values = _sharpened(values, plan)
     nv, nu, nt, ns = light_field.shape[:4]
     s, t = light_field.frame([(nu - 1) / 2, (nv - 1) / 2, (ns - 1) / 2, (nt - 1) / 2])[2:]

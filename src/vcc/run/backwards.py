@@ -76,6 +76,27 @@ def back(
     )
 
 
+def check_room(shape: tuple[int, ...], kind: np.dtype[Any], limit: float) -> None:
+    """Check that the gradient to all samples fits the memory limit.
+
+    Args:
+        shape: of the samples.
+        kind: data type of the gradient.
+        limit: bytes.
+
+    Raises:
+        InputError: it does not.
+    """
+    needed = math.prod(shape) * kind.itemsize
+    if needed > limit:
+        raise InputError(
+            f"the gradient of all samples takes {math.ceil(needed / 1e6)} MB, and memory_limit is "
+            f"{math.ceil(limit / 1e6)} MB: pass a larger one, or an array on disk to an operator's "
+            "adjoint, op.T(picture, out=numpy.lib.format.open_memmap('back.npy', 'w+', op.dtype, "
+            "op.samples_shape))"
+        )
+
+
 class Backwards:
     """The reverse pass of a plan through an engine.
 
@@ -213,14 +234,8 @@ class Backwards:
         shape = self.drive.samples.grid.shape
         if self.drive.in_memory and len(self._blocks) == 1:
             return None
-        needed = math.prod(shape) * self._kind.itemsize
-        if not self.drive.in_memory and needed > self.drive.limit:
-            raise InputError(
-                f"the gradient of all samples takes {math.ceil(needed / 1e6)} MB, and memory_limit is "
-                f"{math.ceil(self.drive.limit / 1e6)} MB: pass a larger one, or an array on disk to an operator's "
-                "adjoint, op.T(picture, out=numpy.lib.format.open_memmap('back.npy', 'w+', op.dtype, "
-                "op.samples_shape))"
-            )
+        if not self.drive.in_memory:
+            check_room(shape, self._kind, self.drive.limit)
         return np.zeros(shape, self._kind)
 
     def _parts(self, raster: Array, samples: bool, progress: Progress | None) -> Iterator[tuple[Block, Gradient]]:

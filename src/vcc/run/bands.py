@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from array_api_compat import array_namespace, is_array_api_obj
+from array_api_compat import array_namespace
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
+from vcc.base.errors import InputError
 from vcc.base.memory import MEMORY_LIMIT
 from vcc.base.workers import Workers
 from vcc.engines import on_gpu
@@ -28,7 +29,10 @@ from vcc.optics.bands import SameWay
 from vcc.optics.response import matrix_of
 from vcc.optics.sensor import Sensor
 from vcc.plan.how import How, cores
+from vcc.plan.model import Plan
 from vcc.run.drive import Recorded
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -73,7 +77,7 @@ class SomeChannels(Brief):
             return None
         if isinstance(values, np.ndarray):
             return _copied(values, self.channels)
-        if not is_array_api_obj(values):
+        if type(values).__module__.startswith("numba"):  # on the GPU, by `on_gpu`
             return on_gpu(np.ascontiguousarray(to_numpy(values)[..., list(self.channels)]))
         return array_namespace(values).stack([values[..., n] for n in self.channels], axis=-1)
 
@@ -86,6 +90,80 @@ class SomeChannels(Brief):
         if self.samples.whole() is not None:
             return self._whole[(*block.slices, ...)]  # type: ignore[index]
         return self.samples.read(block)[..., list(self.channels)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Mixing(Brief):
+    """Images of trains to one image of the sensor: a linear map, the same for all pixels.
+
+    Channel k of the image is Σ shares[n][k, p] · image n[…, p], over all trains n and the p-th channel that takes
+    each.
+
+    Args:
+        shares: of each train, (channels of the image, channels of the light field that take it).
+        without_channels: whether light fields have no axis of channels, and whether images have none.
+    """
+
+    shares: Sequence[Array]
+    without_channels: tuple[bool, bool]
+
+    @classmethod
+    def of(cls, trains: Sequence[SameWay], sensor: Sensor, grid: Grid) -> Mixing:
+        """The weights of ways, and the sensor's response.
+
+        Raises:
+            InputError: as `vcc.optics.response.matrix_of`.
+        """
+        matrix = response_matrix(sensor, grid)
+        shares = [matrix[:, list(same.channels)] * same.weights for same in trains]
+        return cls(shares, (grid.channels is None, sensor.channels_of(grid.channels) is None))
+
+    def __call__(self, images: Sequence[Any]) -> Any:
+        """The image of the sensor, (…, rows, columns[, channels]).
+
+        Args:
+            images: of each train, (…, rows, columns[, channels]), in arrays of any library.
+        """
+        mixed: list[Any] = [None] * len(self.shares[0])
+        for image, shares in zip(images, self.shares, strict=True):
+            for k, p in np.argwhere(shares).tolist():
+                one, share = self._channel(image, p), float(shares[k, p])
+                one = one if share == 1 else one * share
+                mixed[k] = one if mixed[k] is None else mixed[k] + one
+        dark = self._channel(images[0], 0) * 0
+        mixed = [dark if each is None else each for each in mixed]
+        return mixed[0] if self.without_channels[1] else _stacked(mixed)
+
+    def transposed(self, image: NDArray[Any], n: int) -> NDArray[Any]:
+        """The adjoint: weights of an image of the sensor to weights of the image of train n."""
+        image = image[..., None] if self.without_channels[1] else image
+        of_train: NDArray[Any] = image @ self.shares[n].astype(image.dtype)
+        return of_train[..., 0] if self.without_channels[0] else of_train
+
+    def slopes(self, image: NDArray[Any], weights: NDArray[Any], n: int) -> Array:
+        """The gradient to ``shares[n]`` of the image of the sensor, weighted.
+
+        Args:
+            image: of train n, (rows, columns[, channels]).
+            weights: of the image of the sensor, likewise.
+            n: the train.
+        """
+        image = image[..., None] if self.without_channels[0] else image
+        weights = weights[..., None] if self.without_channels[1] else weights
+        return np.asarray(np.tensordot(weights.astype(np.float64), image.astype(np.float64), ((0, 1), (0, 1))))
+
+    def _channel(self, image: Any, p: int) -> Any:
+        return image if self.without_channels[0] else image[..., p]
+
+
+def response_matrix(sensor: Sensor, grid: Grid) -> Array:
+    """(channels of the image, bands): by the sensor's response, or one for each band without one.
+
+    Raises:
+        InputError: as `vcc.optics.response.matrix_of`.
+    """
+    bands = grid.channels or 1
+    return np.eye(bands) if sensor.response is None else matrix_of(sensor.response, bands, grid.wavelengths)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -110,42 +188,79 @@ class BandImages(Brief):
         bands in one channel of the sensor, add up, since all take the same rays; over channels it is their root
         mean square.
         """
-        values, errors, missing = self._by_band()
+        if not self.parts:
+            channels = self.sensor.channels_of(self.grid.channels)
+            return Recorded(
+                np.zeros((*self.sensor.shape, *(() if channels is None else (channels,))), np.float32), 0.0, ""
+            )
+        trains, found = [same for same, _ in self.parts], [found for _, found in self.parts]
+        mixing = Mixing.of(trains, self.sensor, self.grid)
+        missing = np.zeros(self.grid.channels or 1)
+        for same, shares, one in zip(trains, shares_of(trains), found, strict=True):
+            missing[list(same.channels)] += shares * one.missing_rays
         worst = int(np.argmax(missing))
-        reasons = [found.missing_reason for same, found in self.parts if worst in same.channels]
-        values, errors = self._mixed(values, errors)
-        grey = self.sensor.channels_of(self.grid.channels) is None
+        errors = sum(
+            shares.sum(axis=1) * one.sampling_error for shares, one in zip(mixing.shares, found, strict=True)
+        )
+        reasons = [one.missing_reason for same, one in self.parts if worst in same.channels]
         return Recorded(
-            values[0] if grey else _stacked(values),
+            mixing([one.values for one in found]),
             float(missing[worst]),
             next(filter(None, reasons), ""),
             math.sqrt(float(np.mean(np.square(errors)))),
-            sum(found.rays for _, found in self.parts),
-            max((found.samples for _, found in self.parts), default=0),
+            sum(one.rays for one in found),
+            max(one.samples for one in found),
         )
 
-    def _by_band(self) -> tuple[list[Any], NDArray[np.float64], NDArray[np.float64]]:
-        """The image of each band, its sampling error, and the share of its rays that is missing."""
-        count = self.grid.channels or 1
-        values: list[Any] = [None] * count
-        errors, missing = np.zeros(count), np.zeros(count)
-        for (same, found), shares in zip(self.parts, shares_of([same for same, _ in self.parts]), strict=True):
-            for place, (channel, weight) in enumerate(zip(same.channels, same.weights.tolist(), strict=True)):
-                one = found.values if self.grid.channels is None else found.values[..., place]
-                one = one if weight == 1 else one * weight
-                values[channel] = one if values[channel] is None else values[channel] + one
-                errors[channel] += weight * found.sampling_error
-                missing[channel] += shares[place] * found.missing_rays
-        some = next((each for each in values if each is not None), np.zeros(self.sensor.shape, np.float32))
-        return [some * 0 if each is None else each for each in values], errors, missing
 
-    def _mixed(self, values: list[Any], errors: NDArray[np.float64]) -> tuple[list[Any], NDArray[np.float64]]:
-        """Bands to channels of the sensor by its response."""
-        if self.sensor.response is None:
-            return values, errors
-        matrix = matrix_of(self.sensor.response, len(values), self.grid.wavelengths)
-        mixed = [sum(band * weight for band, weight in zip(values, row, strict=True)) for row in matrix.tolist()]
-        return mixed, matrix @ errors
+@dataclass(frozen=True, eq=False, repr=False)
+class BandPlans:
+    """The plans of a camera that depends on the wavelength or the channel, one for each different train.
+
+    Made by `vcc.Camera.compile`; `vcc.Camera.capture` accepts it as ``plan`` for other light fields of the same
+    shape, frame and wavelengths.
+
+    Args:
+        trains: the trains, and the channels that take each.
+        plans: of each, for its channels alone.
+    """
+
+    trains: Sequence[SameWay]
+    plans: Sequence[Plan]
+
+    @property
+    def cautions(self) -> tuple[str, ...]:
+        """Warnings of all plans, once each."""
+        return tuple(dict.fromkeys(caution for plan in self.plans for caution in plan.cautions))
+
+    @property
+    def samples_touched(self) -> int:
+        """Number of samples that an engine processes, for one channel of each plan."""
+        return sum(plan.samples_touched for plan in self.plans)
+
+    def check_fits(self, trains: Sequence[SameWay], grid: Grid) -> None:
+        """Raise an error if the plans were made for something else.
+
+        Args:
+            trains: of the camera and the bands of the light field.
+            grid: of the light field.
+
+        Raises:
+            InputError: another camera, other bands, or another shape or frame of light field.
+        """
+        if [same.channels for same in trains] != [same.channels for same in self.trains]:
+            raise InputError(
+                "these plans are for another camera or for other bands: make them anew with "
+                "camera.compile(light_field)"
+            )
+        for same, plan in zip(trains, self.plans, strict=True):
+            plan.check_fits(same.train, grid.of_channels(same.channels) if grid.channels else grid)
+
+    def __repr__(self) -> str:
+        lines = [f"{len(self.plans)} plans for bands"]
+        for same, plan in zip(self.trains, self.plans, strict=True):
+            lines += [f"{bands_as_text(same.channels, None)}: {plan!r}"]
+        return "\n".join(lines)
 
 
 def read_once(samples: Samples, how: How) -> Samples:

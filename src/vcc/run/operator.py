@@ -6,8 +6,9 @@ column per sample. `Operator` multiplies by A, its adjoint by the transpose.
 
 from __future__ import annotations
 
+import abc
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -17,14 +18,16 @@ from numpy.typing import NDArray
 from vcc.base import lazy_import
 from vcc.base.cached import cached
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, part_of
 from vcc.fields.disparity import Disparities
 from vcc.fields.grid import Block, Grid
 from vcc.fields.sampled import library_of
 from vcc.fields.samples import InMemory, Samples
+from vcc.optics.sensor import Sensor
 from vcc.plan.how import How
 from vcc.plan.model import Plan
-from vcc.run.backwards import Backwards
+from vcc.run.backwards import Backwards, check_room
+from vcc.run.bands import BandPlans, Mixing, SomeChannels, read_once
 from vcc.run.drive import Drive
 from vcc.run.required_samples import required_samples
 
@@ -37,34 +40,23 @@ class Slots(Protocol):
         """Of all samples."""
         ...
 
-    def __setitem__(self, index: Any, values: Any) -> None:
+    def __getitem__(self, index: Any, /) -> Any:
+        """A piece, as an array of NumPy."""
+        ...
+
+    def __setitem__(self, index: Any, values: Any, /) -> None:
         """Store a piece."""
         ...
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Operator:
+class LinearMap(abc.ABC):
     """A camera as a linear map A from the samples of a light field to an image; made by `vcc.Camera.operator`.
 
     ``op(samples)`` returns the image, A · samples; ``op.T(picture)`` returns Aᵀ · image. A sample of 1 is
     radiance 1, whatever the data type of the light field, and samples may be negative.
-
-    Args:
-        plan: computes the image.
-        light_field: defines the grid of the samples.
-        how: engine, threads and memory.
-
-    Raises:
-        InputError: a tolerance, intermediate views interpolated by depth, or samples that are not NumPy arrays:
-            these are not one linear map with a known transpose. The message names the alternative.
     """
 
-    plan: Plan
     light_field: Samples
-    how: How
-
-    def __post_init__(self) -> None:
-        self._drive(self.light_field)
 
     def __call__(
         self, samples: Any = None, *, executor: Any = None, progress: Progress | None = None
@@ -86,12 +78,12 @@ class Operator:
                 does not support, or an executor that fails.
         """
         if samples is None:
-            return self._picture(self.light_field, executor, progress)
+            return self.picture(self.light_field, executor, progress)
         grid = replace(self.light_field.grid, kind=self.dtype)
         return _each(
             self._checked("samples", samples, self.samples_shape),
             self.samples_shape,
-            lambda one: self._picture(InMemory.of(one, grid), executor, progress),
+            lambda one: self.picture(InMemory.of(one, grid), executor, progress),
         )
 
     @property
@@ -105,9 +97,9 @@ class Operator:
         return math.prod(self.picture_shape), math.prod(self.samples_shape)
 
     @property
+    @abc.abstractmethod
     def picture_shape(self) -> tuple[int, ...]:
         """(rows, columns) or (rows, columns, channels)."""
-        return (*self.plan.sensor_shape, *self.samples_shape[4:])
 
     @property
     def samples_shape(self) -> tuple[int, ...]:
@@ -115,10 +107,29 @@ class Operator:
         return self.light_field.grid.shape
 
     @property
-    @cached
+    @abc.abstractmethod
     def dtype(self) -> np.dtype[Any]:
-        """Data type of the results: float32, or float64 with ``engine="reference"``."""
-        return np.dtype(np.float64 if self._drive(self.light_field).able.double else np.float32)
+        """Data type of the results."""
+
+    @abc.abstractmethod
+    def picture(self, samples: Samples, executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The image of a light field on this grid."""
+
+    @abc.abstractmethod
+    def back(self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The samples Aᵀ · image."""
+
+    @abc.abstractmethod
+    def back_into(
+        self, out: Slots, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> None:
+        """Write the samples Aᵀ · image to ``out``, piece by piece."""
+
+    @abc.abstractmethod
+    def back_pieces(
+        self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> Iterator[tuple[Block, NDArray[Any]]]:
+        """The samples Aᵀ · image in blocks of views."""
 
     def as_scipy(self) -> Any:
         """The map for SciPy's solvers, such as ``scipy.sparse.linalg.lsqr``.
@@ -163,26 +174,6 @@ class Operator:
         physics = lazy_import.module("vcc.run.torch_physics")
         return physics.linear_physics(self, self.samples_shape, self.picture_shape, scale, options)
 
-    def __repr__(self) -> str:
-        samples, picture = ("×".join(map(str, shape)) for shape in (self.samples_shape, self.picture_shape))
-        name = self._drive(self.light_field).name
-        return f"Operator({samples} samples to {picture} pixels by {self.plan.core.method}, {name}, {self.dtype})"
-
-    def _drive(self, samples: Samples, executor: Any = None) -> Drive:
-        return Drive.of_linear(self.plan, samples, self.how, executor)
-
-    def _picture(self, samples: Samples, executor: Any, progress: Progress | None) -> NDArray[Any]:
-        drive = Drive.of_linear(*required_samples(self.plan, samples), self.how, executor)
-        picture: NDArray[Any] = drive.picture(drive.rounds(progress))
-        return picture
-
-    def _backwards(self, executor: Any = None) -> Backwards:
-        """The reverse pass; samples are not read. For stored samples and with an executor it runs in blocks."""
-        grid = replace(self.light_field.grid, kind=self.dtype, disparities=Disparities())
-        if executor is not None or self.light_field.whole() is None:
-            return Backwards(self._drive(_Unread(grid), executor))
-        return Backwards(self._drive(InMemory.of(np.broadcast_to(np.zeros((), self.dtype), grid.shape), grid)))
-
     def _checked(self, what: str, given: Any, shape: tuple[int, ...]) -> NDArray[Any]:
         """An array of a shape, or several, checked and converted to `dtype`."""
         if (library := library_of(given)) not in ("numpy", "builtins"):
@@ -207,6 +198,201 @@ class Operator:
         return numbers.astype(self.dtype, copy=False)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Operator(LinearMap):
+    """The linear map of a camera that has one plan.
+
+    Args:
+        plan: computes the image.
+        light_field: defines the grid of the samples.
+        how: engine, threads and memory.
+
+    Raises:
+        InputError: a tolerance, intermediate views interpolated by depth, or samples that are not NumPy arrays:
+            these are not one linear map with a known transpose. The message names the alternative.
+    """
+
+    plan: Plan
+    light_field: Samples
+    how: How
+
+    def __post_init__(self) -> None:
+        self._drive(self.light_field)
+
+    @property
+    def picture_shape(self) -> tuple[int, ...]:
+        """(rows, columns) or (rows, columns, channels)."""
+        return (*self.plan.sensor_shape, *self.samples_shape[4:])
+
+    @property
+    @cached
+    def dtype(self) -> np.dtype[Any]:
+        """Data type of the results: float32, or float64 with ``engine="reference"``."""
+        return np.dtype(np.float64 if self._drive(self.light_field).able.double else np.float32)
+
+    def __repr__(self) -> str:
+        samples, picture = ("×".join(map(str, shape)) for shape in (self.samples_shape, self.picture_shape))
+        name = self._drive(self.light_field).name
+        return f"Operator({samples} samples to {picture} pixels by {self.plan.core.method}, {name}, {self.dtype})"
+
+    def _drive(self, samples: Samples, executor: Any = None) -> Drive:
+        return Drive.of_linear(self.plan, samples, self.how, executor)
+
+    def picture(self, samples: Samples, executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The image of a light field on this grid."""
+        drive = Drive.of_linear(*required_samples(self.plan, samples), self.how, executor)
+        picture: NDArray[Any] = drive.picture(drive.rounds(progress))
+        return picture
+
+    def back(self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The samples Aᵀ · image."""
+        if executor is not None and self.light_field.whole() is not None:  # it fits in memory as well
+            made = np.empty(self.samples_shape, self.dtype)
+            self.back_into(made, picture, executor, progress)
+            return made
+        samples: NDArray[Any] = self._backwards(executor).gradient(picture, progress=progress).samples
+        return samples
+
+    def back_into(
+        self, out: Slots, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> None:
+        """Write the samples Aᵀ · image to ``out``, piece by piece."""
+        unseen = np.ones(out.shape[:2], dtype=bool)
+        for block, samples in self.back_pieces(picture, executor, progress):
+            out[block.slices] = samples
+            unseen[block.slices[:2]] = False
+        for row, column in np.argwhere(unseen):
+            out[int(row), int(column)] = 0
+
+    def back_pieces(
+        self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> Iterator[tuple[Block, NDArray[Any]]]:
+        """The samples Aᵀ · image in blocks of views; those that are in none are 0."""
+        return self._backwards(executor).pieces(picture, progress)
+
+    def check_memory(self, samples_shape: tuple[int, ...]) -> None:
+        """Check that samples of a stored light field fit the memory limit.
+
+        Raises:
+            InputError: they do not.
+        """
+        if self.light_field.whole() is None:
+            check_room(samples_shape, self.dtype, self._drive(self.light_field).limit)
+
+    def _backwards(self, executor: Any = None) -> Backwards:
+        """The reverse pass; samples are not read. For stored samples and with an executor it runs in blocks."""
+        grid = replace(self.light_field.grid, kind=self.dtype, disparities=Disparities())
+        if executor is not None or self.light_field.whole() is None:
+            return Backwards(self._drive(_Unread(grid), executor))
+        return Backwards(self._drive(InMemory.of(np.broadcast_to(np.zeros((), self.dtype), grid.shape), grid)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BandOperator(LinearMap):
+    """The linear map of a camera that depends on the wavelength or the channel: a map for each group of bands.
+
+    Args:
+        parts: the channels that take each train, and the map of these channels.
+        mixing: from their images to that of the sensor.
+        light_field: defines the grid of the samples.
+        sensor_shape: (rows, columns).
+    """
+
+    parts: Sequence[tuple[tuple[int, ...], Operator]]
+    mixing: Mixing
+    light_field: Samples
+    sensor_shape: tuple[int, int]
+
+    @classmethod
+    def of(cls, plans: BandPlans, sensor: Sensor, light_field: Samples, how: How) -> BandOperator:
+        """The map by the plans of a camera.
+
+        Args:
+            plans: one for each group of bands.
+            sensor: of the camera, with or without a response.
+            light_field: defines the grid of the samples.
+            how: engine, threads and memory.
+
+        Raises:
+            InputError: as for `Operator`; or a camera that nothing passes in any channel.
+        """
+        if not plans.plans:
+            raise InputError("nothing passes this camera in any channel: its image is 0 for all samples")
+        light_field = read_once(light_field, how) if len(plans.plans) > 1 else light_field
+        parts = [
+            (same.channels, Operator(plan, SomeChannels.of(light_field, same.channels), how))
+            for same, plan in zip(plans.trains, plans.plans, strict=True)
+        ]
+        mixing = Mixing.of(plans.trains, sensor, light_field.grid)
+        return cls(parts, mixing, light_field, sensor.shape)
+
+    @property
+    def picture_shape(self) -> tuple[int, ...]:
+        """(rows, columns) or (rows, columns, channels of the sensor)."""
+        grey = self.mixing.without_channels[1]
+        return (*self.sensor_shape, *(() if grey else self.mixing.shares[0].shape[:1]))
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Data type of the results: float32, or float64 with ``engine="reference"``."""
+        return self.parts[0][1].dtype
+
+    def picture(self, samples: Samples, executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The image of a light field on this grid."""
+        found: NDArray[Any] = self.mixing(
+            [
+                op.picture(SomeChannels.of(samples, channels), executor, part_of(progress, n, len(self.parts)))
+                for n, (channels, op) in enumerate(self.parts)
+            ]
+        )
+        return found
+
+    def back(self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None) -> NDArray[Any]:
+        """The samples Aᵀ · image."""
+        self.parts[0][1].check_memory(self.samples_shape)
+        made = np.zeros(self.samples_shape, self.dtype)
+        for n, (channels, op) in enumerate(self.parts):
+            advance = part_of(progress, n, len(self.parts))
+            found = op.back(self.mixing.transposed(picture, n), executor, advance)
+            for place, channel in self._places(channels):
+                made[channel] += found[place]
+        return made
+
+    def back_into(
+        self, out: Slots, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> None:
+        """Write the samples Aᵀ · image to ``out``, piece by piece; channels that several trains have are added."""
+        for view in np.ndindex(out.shape[:2]):
+            out[view] = 0
+        for n, (channels, op) in enumerate(self.parts):
+            advance = part_of(progress, n, len(self.parts))
+            for block, samples in op.back_pieces(self.mixing.transposed(picture, n), executor, advance):
+                for place, channel in self._places(channels):
+                    there = (*block.slices, *channel)
+                    out[there] = out[there] + samples[place]
+
+    def back_pieces(
+        self, picture: NDArray[Any], executor: Any = None, progress: Progress | None = None
+    ) -> Iterator[tuple[Block, NDArray[Any]]]:
+        """Raise an error: the maps of different bands are cut into different blocks."""
+        raise InputError(
+            "pieces of the samples have all channels, and this camera has a map for each group of bands: pass an "
+            "array on disk, op.T(picture, out=…), or use camera.at_wavelength(550 * nm).operator(…)"
+        )
+
+    def _places(self, channels: tuple[int, ...]) -> Iterator[tuple[Any, Any]]:
+        """Where each channel of a train is in its own samples, and where in all."""
+        if self.mixing.without_channels[0]:
+            yield (...,), (...,)
+            return
+        for place, channel in enumerate(channels):
+            yield (..., place), (..., channel)
+
+    def __repr__(self) -> str:
+        samples, picture = ("×".join(map(str, shape)) for shape in (self.samples_shape, self.picture_shape))
+        return f"BandOperator({samples} samples to {picture} pixels by {len(self.parts)} plans, {self.dtype})"
+
+
 @dataclass(frozen=True, eq=False)
 class Adjoint:
     """The adjoint Aᵀ of an `Operator`: it maps images to samples.
@@ -215,7 +401,7 @@ class Adjoint:
     describes a display with its pixels at those of the sensor, whose light travels backwards.
     """
 
-    T: Operator
+    T: LinearMap
 
     def __call__(
         self, picture: Any, *, out: Slots | None = None, executor: Any = None, progress: Progress | None = None
@@ -241,9 +427,14 @@ class Adjoint:
                 executor that fails.
         """
         checked = self.T._checked("pictures", picture, self.T.picture_shape)
-        if out is not None:
-            return self._into(out, checked, executor, progress)
-        return _each(checked, self.T.picture_shape, lambda one: self._samples(one, executor, progress))
+        if out is None:
+            return _each(checked, self.T.picture_shape, lambda one: self.T.back(one, executor, progress))
+        if tuple(out.shape) != self.T.samples_shape:
+            raise InputError(
+                f"out has the shape {tuple(out.shape)}, but the samples have the shape {self.T.samples_shape}"
+            )
+        self.T.back_into(out, checked, executor, progress)
+        return out
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -264,32 +455,13 @@ class Adjoint:
             (block, samples): ``block.slices`` is their place. Views that are in no block have samples of 0.
 
         Raises:
-            InputError: see the call.
+            InputError: see the call; or a camera that has a plan for each group of bands.
         """
         checked = self.T._checked("pictures", picture, self.T.picture_shape)
-        return self.T._backwards(executor).pieces(checked, progress)
+        return self.T.back_pieces(checked, executor, progress)
 
     def __repr__(self) -> str:
         return f"{self.T!r}.T"
-
-    def _samples(self, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Any:
-        if executor is not None and self.T.light_field.whole() is not None:  # it fits in memory as well
-            made = np.empty(self.T.samples_shape, self.T.dtype)
-            return self._into(made, picture, executor, progress)
-        return self.T._backwards(executor).gradient(picture, progress=progress).samples
-
-    def _into(self, out: Slots, picture: NDArray[Any], executor: Any, progress: Progress | None) -> Slots:
-        if tuple(out.shape) != self.T.samples_shape:
-            raise InputError(
-                f"out has the shape {tuple(out.shape)}, but the samples have the shape {self.T.samples_shape}"
-            )
-        unseen = np.ones(out.shape[:2], dtype=bool)
-        for block, samples in self.T._backwards(executor).pieces(picture, progress):
-            out[block.slices] = samples
-            unseen[block.slices[:2]] = False
-        for row, column in np.argwhere(unseen):
-            out[int(row), int(column)] = 0
-        return out
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -50,11 +50,12 @@ def linear_physics(
         options: of the physics.
     """
     scale = checks.above_zero("scale", scale, unit="")
-    channels = samples[4:]
-    shapes = [(*(channels or (1,)), *samples[:4]), (*(channels or (1,)), *picture[:2])]
+    channels = samples[4:], picture[2:]
+    shapes = [(*(channels[0] or (1,)), *samples[:4]), (*(channels[1] or (1,)), *picture[:2])]
+    coloured = bool(channels[0]), bool(channels[1])
     return LinearPhysics(
-        A=_Times(ahead, "samples", shapes[0], bool(channels), scale),
-        A_adjoint=_Times(ahead.T, "pictures", shapes[1], bool(channels), scale),
+        A=_Times(ahead, "samples", shapes[0], coloured, scale),
+        A_adjoint=_Times(ahead.T, "pictures", shapes[1], coloured[::-1], scale),
         img_size=shapes[0],
         **options,
     )
@@ -68,14 +69,14 @@ class _Times:
         map: of arrays, channels last.
         what: name of the map's input, for messages.
         shape: of one input, channels first.
-        coloured: whether the arrays have a channel axis.
+        coloured: whether the arrays of inputs, and those of results, have a channel axis.
         scale: factor of the result.
     """
 
     map: LinearMap
     what: str
     shape: tuple[int, ...]
-    coloured: bool
+    coloured: tuple[bool, bool]
     scale: float
 
     def __call__(self, tensor: torch.Tensor, **parameters: Any) -> torch.Tensor:
@@ -104,10 +105,10 @@ class _Product(torch.autograd.Function):  # type: ignore[misc]
     """A linear map of tensors, whose derivative is the adjoint; differentiable to any order."""
 
     @staticmethod
-    def forward(map: LinearMap, tensor: torch.Tensor, coloured: bool) -> torch.Tensor:
+    def forward(map: LinearMap, tensor: torch.Tensor, coloured: tuple[bool, bool]) -> torch.Tensor:
         given = tensor.detach().to(torch.promote_types(tensor.dtype, torch.float32)).numpy()
-        made = map(np.ascontiguousarray(np.moveaxis(given, 1, -1) if coloured else given[:, 0]))
-        first = np.moveaxis(made, -1, 1) if coloured else made[:, None]
+        made = map(np.ascontiguousarray(np.moveaxis(given, 1, -1) if coloured[0] else given[:, 0]))
+        first = np.moveaxis(made, -1, 1) if coloured[1] else made[:, None]
         return torch.from_numpy(np.ascontiguousarray(first))
 
     @staticmethod
@@ -116,4 +117,4 @@ class _Product(torch.autograd.Function):  # type: ignore[misc]
 
     @staticmethod
     def backward(ctx: Any, weights: torch.Tensor) -> tuple[Any, ...]:
-        return None, _Product.apply(ctx.map.T, weights, ctx.coloured), None
+        return None, _Product.apply(ctx.map.T, weights, ctx.coloured[::-1]), None

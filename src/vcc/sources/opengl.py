@@ -91,12 +91,12 @@ class Lighting:
 
     def __post_init__(self) -> None:
         for name in ("ambient", "sun", "fill"):
-            _light(name, getattr(self, name))
+            check_light(name, getattr(self, name))
         if not 0 < math.hypot(*self.sun_from) < math.inf:
             raise InputError(f"sun_from is a direction of three numbers, not {self.sun_from}")
 
 
-def _light(name: str, given: Sequence[float]) -> Vector:
+def check_light(name: str, given: Sequence[float]) -> Vector:
     """Check radiance: three finite numbers, 0 or more."""
     if len(given) != 3 or not all(part >= 0 and math.isfinite(part) for part in given):
         raise InputError(f"{name} is light as (red, green, blue), each 0 or more, not {given}")
@@ -142,7 +142,7 @@ class OpenGLRenderer:
             checks.whole_number_between(name, count, 1, 16)
         self.viewpoint = viewpoint or Viewpoint()
         self.lighting = lighting or Lighting()
-        self.background = _light("background", background)
+        self.background = check_light("background", background)
         self.supersampling, self.multisampling = supersampling, multisampling
         self._names, scenes = loaded(meshes)
         self._parts = parts_of(scenes, self.viewpoint.array_from_scene())

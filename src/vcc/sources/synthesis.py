@@ -14,6 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 from vcc import __version__
 from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
+from vcc.fields.disparity import Disparities
 from vcc.light_field import LightField
 from vcc.sources.views import CameraArray, ViewCamera
 from vcc.store import StoredLightField, create_store
@@ -23,7 +24,11 @@ DTYPES = ("float16", "float32", "uint8", "uint16")
 
 
 class Renderer(Protocol):
-    """Renders the image of one view. A renderer that holds resources may also have ``close()``."""
+    """Renders the image of one view. A renderer that holds resources may also have ``close()``.
+
+    A renderer that computes depth may also have ``disparity_maps(cameras)``, which returns `DisparityMaps`: they
+    become the disparities of the light field.
+    """
 
     def description(self) -> dict[str, Any]:
         """Everything that an image depends on except the camera, as JSON data.
@@ -90,7 +95,11 @@ def _in_memory(
         values[row, column] = _rendered(renderer, cameras, row, column, done, cut, hint)
     tell(progress, len(order), len(order))
     cut.warn()
-    return cameras.light_field(values)
+    light_field = cameras.light_field(values)
+    maps = getattr(renderer, "disparity_maps", None)
+    if maps is None:
+        return light_field
+    return LightField(values, light_field.frame, disparity=Disparities(maps(cameras)))
 
 
 def _in_store(
@@ -117,6 +126,9 @@ def _in_store(
             writer.write_view(row, column, _rendered(renderer, cameras, row, column, done, cut, hint))
         tell(progress, total, total)
         cut.warn()
+        maps = getattr(renderer, "disparity_maps", None)
+        if maps is not None and not writer.attributes.complete:
+            writer.write_disparity(maps(cameras))
         return writer.finish()
 
 

@@ -16,6 +16,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.version import VERSION
 from vcc.base.wavelengths import wavelengths as all_checked
+from vcc.fields.filling import Filling
 from vcc.fields.grid import Sample
 from vcc.store.held import IDENTITY
 
@@ -53,6 +54,7 @@ class Attributes(Brief):
         sample: ``"mean"`` or ``"point"``, see `vcc.LightField`; ``"mean"`` for stores without this attribute.
         identity: a random text drawn when the store is made (`vcc.store.held`); None for older stores.
         wavelengths: in the middle of each channel's band, metres, or None; stores without the attribute have none.
+        filling: views that were not recorded; stores without the attribute have none.
     """
 
     frame: Affine
@@ -66,10 +68,12 @@ class Attributes(Brief):
     sample: Sample = "mean"
     identity: str | None = None
     wavelengths: tuple[float, ...] | None = None
+    filling: Filling | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The attributes as JSON data."""
         wavelengths = {} if self.wavelengths is None else {"wavelengths": list(self.wavelengths)}
+        filling = {} if self.filling is None else {"filling": self.filling.lists()}
         return {
             "format_version": FORMAT_VERSION,
             IDENTITY: self.identity,
@@ -80,6 +84,7 @@ class Attributes(Brief):
             "sample": self.sample,
             "channel_names": None if self.channel_names is None else list(self.channel_names),
             **wavelengths,
+            **filling,
             "disparity_range": None if self.disparity_range is None else list(self.disparity_range),
             "provenance": plain(self.provenance, "provenance"),
             "description": None if self.description is None else plain(self.description, "description"),
@@ -112,6 +117,7 @@ class Attributes(Brief):
                 f"{path}: axes are {list(AXES)} and units {UNITS}, not {stated.get('axes')} and "
                 f"{stated.get('units')}"
             )
+        filling = stated.get("filling")
         try:
             made = cls(
                 frame=Affine(np.array(stated["frame"], dtype=np.float64)),
@@ -125,6 +131,7 @@ class Attributes(Brief):
                 sample=stated.get("sample", "mean"),
                 identity=stated.get(IDENTITY),
                 wavelengths=_tuple(stated.get("wavelengths")),
+                filling=None if filling is None else Filling.of_lists(filling, str(path)),
             )
         except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"{path}: its attributes cannot be used: {error}") from None

@@ -87,6 +87,7 @@ class StoredLightField(OnGrid):
             self.disparity_range,
             Disparities(find=self._kept_or_found, measure=self._measured),
             wavelengths=self.wavelengths,
+            filling=self.attributes.filling,
         )
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -99,7 +99,11 @@ class VideoWriter:
             kept.channel_names or self.packing.channel_names,
             grid.wavelengths,
         )
-        stated = {"disparity_range": grid.disparity_range, "provenance": kept.provenance}
+        stated = {
+            "disparity_range": grid.disparity_range,
+            "provenance": kept.provenance,
+            "filling": grid.filling,
+        }
         maps = grid.disparities.maps() if grid.disparities.known else None
         with self._frame(common, time, stated) as writer:
             write_all(writer, kept.view, progress, maps)

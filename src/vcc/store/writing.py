@@ -24,6 +24,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.words import first_few
 from vcc.base.workers import uninterrupted
 from vcc.fields.disparity import DisparityMaps
+from vcc.fields.filling import Filling
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.fields.view_arrays import one_view
@@ -132,6 +133,21 @@ class StoreWriter:
             difference = kept_as.astype(np.float64) - view
             self._errors[row, column] = float(np.mean(difference * difference))
 
+    def write_disparity(self, maps: DisparityMaps) -> None:
+        """Write disparity maps next to the samples, if there are none yet.
+
+        Args:
+            maps: the maps, with their source.
+
+        Raises:
+            InputError: the write fails.
+        """
+        try:
+            keep_maps(self.path, maps)
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"the disparities could not be written to {self.path}: {reason}") from error
+
     def finish(self) -> StoredLightField:
         """Mark the store as complete and open it.
 
@@ -216,6 +232,7 @@ def create_store(
     disparity_range: tuple[float, float] | None = None,
     sample: Sample = "mean",
     wavelengths: tuple[float, ...] | None = None,
+    filling: Filling | None = None,
     chunks: Pixels | None = None,
     compression: Compression | None = None,
 ) -> StoreWriter:
@@ -233,6 +250,7 @@ def create_store(
         disparity_range: (lowest, highest), pixels per view along u, if known.
         sample: ``"mean"`` over a pixel or ``"point"``, see `vcc.LightField`.
         wavelengths: in the middle of each channel's band, metres, if known.
+        filling: views that were not recorded, see `vcc.LightField`.
         chunks: rows of pixels per chunk, or (rows, columns): cameras and parts that need few pixels of each
             view read only the chunks that contain them. None uses rows of about 128 KiB.
         compression: `Lossless` or `Lossy`; None is ``Lossless()``.
@@ -273,6 +291,7 @@ def create_store(
         sample=sample,
         identity=drawn(),
         wavelengths=None if wavelengths is None else tuple(map(float, wavelengths)),
+        filling=filling,
     )
     attributes.check(str(folder), shape[4] if len(shape) == 5 else None)
     attributes.as_json()  # raises for data that JSON cannot represent, before anything is created
@@ -378,6 +397,7 @@ def write_views(
                 "disparity_range": grid.disparity_range,
                 "sample": grid.sample,
                 "wavelengths": grid.wavelengths,
+                "filling": grid.filling,
             }
             part = part_of(folder)
             begin = partial(create_store, part, grid.frame, grid.shape, grid.kind, **stated)
@@ -432,14 +452,7 @@ def write_all(
         writer.write_view(j, i, view(j, i))
         tell(progress, done, total)
     if disparity is not None:
-        _keep(writer.path, disparity)
-
-
-def _keep(part: Path, disparity: DisparityMaps) -> None:
-    try:
-        keep_maps(part, disparity)
-    except OSError as error:
-        raise InputError(f"the disparities could not be written to {part}: {error.strerror or error}") from error
+        writer.write_disparity(disparity)
 
 
 def _check(folder: Path, shape: tuple[int, ...], kind: np.dtype[Any], transfer: str, packing: Compression) -> None:

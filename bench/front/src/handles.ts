@@ -1,0 +1,72 @@
+/** Handles of what is selected: points of the drawing that change a parameter when they are dragged. */
+
+import { svg } from "lit";
+
+import type { Bench } from "./bench";
+import type { Mapping } from "./frame";
+import { inMillimetres, short } from "./numbers";
+import type { Handle, Value, Where } from "./protocol";
+
+/** Lengths that are dragged stay at or above this, metres. */
+const LEAST = 1e-5;
+const RADIUS = 5;
+
+export interface Held {
+  handle: Handle;
+  where: Where;
+  value: number;
+  /** Of the pointer when it began, pixels. */
+  x: number;
+  y: number;
+  moved: boolean;
+}
+
+/** Of the selected part; those of the light field's plane are its place alone. */
+export function handlesOf(bench: Bench): Handle[] {
+  const { selected } = bench;
+  if (selected === "light field") return [];
+  return (selected === "sensor" ? bench.side?.sensor.handles : bench.side?.elements[selected]?.handles) ?? [];
+}
+
+export function placeOf(bench: Bench, handle: Handle, scale: Mapping): { x: number; y: number } {
+  const z = bench.placeOf(bench.selected) + handle.z;
+  return { x: scale.x(z), y: Math.min(Math.max(scale.y(handle.height), scale.top - 2), scale.bottom + 2) };
+}
+
+/** The parameter's value as a document has it, after the pointer has moved. */
+export function valueAt(held: Held, x: number, y: number, scale: Mapping): { value: number; words: Value } {
+  const { handle } = held;
+  const moved = handle.along === "z" ? scale.z(x) - scale.z(held.x) : scale.height(y) - scale.height(held.y);
+  return asValue(handle, held.handle.value + handle.rate * moved);
+}
+
+/** A number of a handle, kept where it makes sense and rounded as a hand can place it. */
+export function asValue(handle: Handle, wanted: number): { value: number; words: Value } {
+  const sized = handle.words !== "decentre" && handle.unit === "length";
+  const sign = handle.value < 0 ? -1 : 1;
+  let value = sized && sign * wanted < LEAST ? sign * LEAST : wanted;
+  value = Number(value.toPrecision(4));
+  if (!sized && Math.abs(value) < 1e-6) value = 0;
+  const one = handle.unit === "angle" ? `${Number(((value * 180) / Math.PI).toPrecision(4))} deg` : inMillimetres(value);
+  if (handle.pair === null || handle.other === null) return { value, words: one };
+  const words: Value[] = [inMillimetres(handle.other), inMillimetres(handle.other)];
+  words[handle.pair] = one;
+  return { value, words };
+}
+
+export function inWords(handle: Handle): string {
+  const value = handle.unit === "angle" ? `${Number(((handle.value * 180) / Math.PI).toPrecision(4))}°` : short(handle.value, 4);
+  return `${handle.words} ${value}`;
+}
+
+const SIGNS: { [words: string]: string } = { "focal length": "F", rotation: "↻" };
+
+export function drawnHandle(handle: Handle, x: number, y: number, active: boolean) {
+  const letter = SIGNS[handle.words];
+  const shape = handle.words === "decentre"
+    ? svg`<path d="M${x} ${y - RADIUS - 1}l${RADIUS + 1} ${RADIUS + 1}l${-RADIUS - 1} ${RADIUS + 1}l${-RADIUS - 1} ${-RADIUS - 1}z"></path>`
+    : svg`<circle cx=${x} cy=${y} r=${letter ? RADIUS + 2 : RADIUS}></circle>`;
+  const above = y > 110;
+  return svg`${shape}${letter ? svg`<text class="sign" x=${x} y=${y + 3.5} text-anchor="middle">${letter}</text>` : ""}
+    <text class="says ${active ? "active" : ""}" x=${x + (x > 140 ? -11 : 11)} y=${y + (above ? -9 : 17)} text-anchor=${x > 140 ? "end" : "start"}>${inWords(handle)}</text>`;
+}

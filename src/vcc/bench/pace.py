@@ -1,0 +1,126 @@
+"""The fineness of images during a drag: the finest that the machine makes in time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken
+
+IN_TIME = 0.022
+"""Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made."""
+CLOSE = 1.3
+"""A finer image is made in any case if it takes up to this times the quickest."""
+LONGER, SHORTER = 0.3, 0.9
+"""Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
+LEFT = 0.4
+"""Seconds after which a fineness that was too slow is tried again, if it was fast enough once."""
+TRIALS = 0.1
+"""Share of the time that trials may cost: the slower one was, the longer it is left."""
+WORTH = 1.1
+"""A fineness is tried again if its shortest time, by how busy the machine is, is at most this times the limit."""
+BUSY, FREE = 1.5, 1.2
+"""Times the shortest time from which on the machine is busy, and up to which it is free."""
+MOST_KINDS = 50
+"""Camera kinds whose times are remembered."""
+
+
+@dataclass
+class _Times:
+    """Times of images of one kind and fineness, seconds.
+
+    Args:
+        recent: a running mean.
+        planning: the part of it before the plan was ready.
+        least: the shortest.
+        at: the clock at the newest.
+    """
+
+    recent: float
+    planning: float
+    least: float
+    at: float
+
+
+class Pace:
+    """Chooses the fineness of an image from the times of earlier images of the same kind of camera.
+
+    The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest. For a
+    fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
+    scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
+    busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
+    were measured meanwhile are forgotten.
+
+    Args:
+        clock: seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._kept: dict[Hashable, tuple[bool, dict[Fineness, _Times]]] = {}
+        self._busy: set[Fineness] = set()
+
+    def noted(self, of: Hashable, fineness: Fineness, taken: Taken) -> None:
+        """Record the time of an image.
+
+        Args:
+            of: the key of cameras and light fields that take about the same time.
+            fineness: of the image.
+            taken: the image.
+        """
+        by_rays, times = self._kept.pop(of, (taken.by_rays, {}))
+        if by_rays != taken.by_rays:
+            by_rays, times = taken.by_rays, {}
+        now, took, planning = self._clock(), taken.seconds, taken.planning
+        before = times.get(fineness)
+        if before is None:
+            times[fineness] = _Times(took, planning, took, now)
+        else:
+            weight = LONGER if took > before.recent else SHORTER
+            before.recent += weight * (took - before.recent)
+            before.planning += weight * (planning - before.planning)
+            before.least, before.at = min(before.least, took), now
+            if took > BUSY * before.least:
+                self._busy.add(fineness)
+            elif took < FREE * before.least and fineness in self._busy:
+                for each in times.values():
+                    each.recent = min(each.recent, each.least)
+                self._busy.clear()
+        for coarser, each in list(times.items()):  # compiling kernels delayed the first of a coarser kind
+            if coarser.share(by_rays) < fineness.share(by_rays) and each.recent > took:
+                del times[coarser]
+        self._kept[of] = by_rays, times
+        if len(self._kept) > MOST_KINDS:
+            del self._kept[next(iter(self._kept))]
+
+    def seconds(self, of: Hashable) -> float | None:
+        """Expected time of a whole image, seconds; None without measurements."""
+        return self._expected(of, WHOLE) if of in self._kept else None
+
+    def fineness(self, of: Hashable) -> Fineness:
+        """The fineness of the next image; without measurements, the finest coarse one."""
+        if of not in self._kept:
+            return COARSER[0]
+        expected = {each: self._expected(of, each) for each in (WHOLE, *COARSER)}
+        limit = max(IN_TIME, CLOSE * min(expected.values()))
+        return next(each for each, seconds in expected.items() if seconds <= limit or self._tried(of, each, limit))
+
+    def _tried(self, of: Hashable, fineness: Fineness, limit: float) -> bool:
+        """Whether a fineness that was too slow is worth another trial now."""
+        every = self._kept[of][1]
+        times = every.get(fineness)
+        newest = max(every.values(), key=lambda each: each.at)
+        if times is None or times.least * newest.recent / newest.least > WORTH * limit:
+            return False
+        return self._clock() - times.at >= max(LEFT, (times.recent - limit) / TRIALS)
+
+    def _expected(self, of: Hashable, fineness: Fineness) -> float:
+        by_rays, times = self._kept[of]
+        if fineness in times:
+            return times[fineness].recent
+        share = fineness.share(by_rays)
+        return min(
+            each.planning + share / other.share(by_rays) * (each.recent - each.planning)
+            for other, each in times.items()
+        )

@@ -1,0 +1,92 @@
+"""How fine an image is during a drag: the finest in time, and soon again after the machine was busy."""
+
+import types
+
+import pytest
+
+from vcc.bench.pace import CLOSE, IN_TIME, LEFT, TRIALS, Pace
+from vcc.bench.picture import COARSER, WHOLE
+
+HALF, HALF_FEW, QUARTER, QUARTER_FEW = COARSER
+
+
+class Machine:
+    """Takes given seconds for images of a fineness, and counts the time.
+
+    Args:
+        took: seconds by fineness, when nothing else runs.
+    """
+
+    def __init__(self, took):
+        self.took, self.now, self.busy = took, 0.0, 1.0
+        self.pace = Pace(lambda: self.now)
+        for each in took:
+            self.make(each)
+
+    def make(self, fineness):
+        seconds = self.busy * self.took[fineness]
+        self.now += seconds
+        self.pace.noted("lens", fineness, types.SimpleNamespace(seconds=seconds, planning=0.004, by_rays=False))
+
+    def drag(self, seconds):
+        """What is made in a drag of so long."""
+        made, end = [], self.now + seconds
+        while self.now < end:
+            made.append(self.pace.fineness("lens"))
+            self.make(made[-1])
+        return made
+
+
+QUICK = {WHOLE: 0.015, HALF: 0.008, HALF_FEW: 0.008, QUARTER: 0.006, QUARTER_FEW: 0.006}
+SLOW = {WHOLE: 0.3, HALF: 0.018, HALF_FEW: 0.018, QUARTER: 0.012, QUARTER_FEW: 0.012}
+NEVER_IN_TIME = {WHOLE: 2.0, HALF: 0.090, HALF_FEW: 0.085, QUARTER: 0.072, QUARTER_FEW: 0.070}
+
+
+@pytest.mark.parametrize(("took", "finest"), [(QUICK, WHOLE), (SLOW, HALF), (NEVER_IN_TIME, HALF)])
+def test_finest_in_time_or_close_to_the_quickest_is_made(took, finest):
+    assert took[finest] <= max(IN_TIME, CLOSE * min(took.values()))
+    assert set(Machine(took).drag(1)) == {finest}
+
+
+def test_nothing_is_coarser_than_a_quarter_a_side_however_long_it_takes():
+    assert max(each.pixels for each in COARSER) == 4
+    assert Machine({each: 10.0 * each.share(False) for each in QUICK}).drag(20)[-1].pixels == 4
+
+
+@pytest.mark.parametrize("took", [QUICK, SLOW])
+@pytest.mark.parametrize("busy", [0.2, 2.0, 20.0])
+def test_half_a_second_after_a_busy_time_images_are_as_fine_as_before(took, busy):
+    machine = Machine(took)
+    before = machine.drag(0.5)[-1]
+    machine.busy = 4.0
+    machine.drag(busy)
+    machine.busy = 1.0
+    machine.drag(0.5)
+    after = machine.drag(0.5)
+    assert after[0] == before
+    assert after.count(before) >= len(after) - 1
+
+
+def test_single_late_image_changes_nothing():
+    machine = Machine(QUICK)
+    machine.busy = 1.8
+    machine.drag(0.001)
+    machine.busy = 1.0
+    assert set(machine.drag(0.3)) == {WHOLE}
+
+
+def test_what_is_too_slow_costs_a_tenth_of_the_time_at_most():
+    machine = Machine(SLOW | {WHOLE: 0.020})
+    machine.took[WHOLE] = 0.040  # from now on: it was in time once, and is worth trials
+    made = machine.drag(30)
+    spent = made.count(WHOLE) * (0.040 - IN_TIME)
+    assert 0 < spent <= TRIALS * 30
+    assert 30 / made.count(WHOLE) >= LEFT
+
+
+def test_delay_of_a_first_image_by_compilation_is_forgotten_when_a_finer_one_is_quicker():
+    machine = Machine({HALF: 5.0})
+    machine.took = QUICK
+    machine.make(WHOLE)
+    assert machine.pace.fineness("lens") == WHOLE
+    assert machine.pace.fineness("another") == HALF

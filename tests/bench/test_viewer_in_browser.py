@@ -1,0 +1,257 @@
+"""What one expects of a viewer of pictures, and comparing many: the bench in headless Chromium."""
+
+import io
+import itertools
+
+import numpy as np
+import PIL.Image
+import pytest
+
+from tests.bench.browser import CAMERA, Page, Served, chromium
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def served(browser):  # no server where there is no browser
+    bench = Served()
+    bench.start()
+    yield bench
+    bench.stop()
+
+
+@pytest.fixture
+def page(browser, served):
+    opened = Page(browser, served.address)
+    yield opened
+    opened.close()
+
+
+def canvas(page):
+    """The canvas as it looks, as numbers."""
+    return np.asarray(PIL.Image.open(io.BytesIO(page.picture())).convert("RGB")).astype(int)
+
+
+def changed(page, before):
+    """Wait until the canvas looks different."""
+    for _ in range(100):
+        now = canvas(page)
+        if now.shape != before.shape or np.abs(now - before).max() > 8:
+            return now
+        page.page.wait_for_timeout(50)
+    raise AssertionError("the canvas looks the same")
+
+
+def test_levels_show_what_is_clipped_and_change_black_white_and_channel(page):
+    before = canvas(page)
+    page.button("Levels").click()
+    levels = page.page.locator("vcc-bench-levels")
+    assert levels.locator(".bars").count() == 3
+    assert "above white" in levels.locator(".clipped").text_content()
+    panel = canvas(page)
+    levels.get_by_label("black").first.press("Shift+ArrowRight")
+    darker = changed(page, panel)
+    levels.get_by_label("Channel").select_option("0")
+    red = changed(page, darker)
+    middle = red[60:200, 300:500]  # of the picture, above the panel
+    assert np.abs(middle[..., 0] - middle[..., 1]).max() <= 2  # one channel is grey
+    levels.get_by_label("linear").check()
+    changed(page, red)
+    levels.get_by_role("slider", name="white").press("ArrowLeft")
+    page.page.wait_for_timeout(100)
+    page.settle()
+    assert page.page.get_by_label("Fix exposure").is_checked()
+    levels.get_by_label("linear").uncheck()
+    levels.get_by_label("Channel").select_option("")
+    levels.get_by_role("button", name="Auto").click()
+    page.page.wait_for_timeout(300)
+    page.settle()
+    page.button("Levels").click()
+    assert np.abs(canvas(page) - before).mean() < 1
+
+
+def test_pointer_reads_values_and_the_place_on_the_sensor(page):
+    box = page.page.locator("canvas").bounding_box()
+    page.page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + box["height"] / 2 + 2)
+    page.page.get_by_text("column 40, row 30").wait_for()
+    # The pixel right of the middle and below it, as seen; the sensor's image is inverted: half a pitch of 0.25 mm.
+    page.page.get_by_text("x -0.125 mm, y -0.125 mm").wait_for()
+
+
+def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):
+    page.button("Profile along a line").click()
+    box = page.page.locator("canvas").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.page.mouse.move(x - 100, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x + 100, y, steps=4)
+    page.page.mouse.up()
+    plot = page.page.get_by_role("img", name="Irradiance along a line of")
+    plot.wait_for()
+    assert plot.locator("path.red").count() == 1
+    words = plot.get_attribute("aria-label")
+    page.page.locator("canvas").focus()
+    page.page.keyboard.press("p")  # ends
+    assert plot.count() == 0
+    page.page.keyboard.press("ArrowRight")
+    page.page.keyboard.press("p")
+    for _ in range(4):
+        page.page.keyboard.press("ArrowRight")
+    page.page.get_by_role("img", name="Irradiance along a line of 1 mm").wait_for()  # four pixels of 0.25 mm
+    assert words != "Irradiance along a line of 1 mm"
+
+
+def test_picture_is_downloaded_as_it_is_shown(page):
+    with page.page.expect_download() as taken:
+        page.button("Download as shown").click()
+    saved = np.asarray(PIL.Image.open(taken.value.path()).convert("RGB")).astype(int)
+    shown = canvas(page)
+    assert np.abs(np.array(saved.shape) - shown.shape).max() <= 1  # half a pixel of the page
+    assert np.abs(saved[100:600, 100:600] - shown[100:600, 100:600]).mean() < 4  # which begins within a pixel
+
+
+def put(page, place):
+    """Type the place of the sensor."""
+    page.page.get_by_role("tab", name="sensor").click()
+    page.page.locator("#sensor-z").fill(place)
+    page.page.keyboard.press("Enter")
+    page.wait_for_place("sensor", place)
+    page.settle()
+
+
+def test_pinned_states_are_a_strip_to_compare_with_and_to_return_to(page):
+    for place in ("51 mm", "52.5 mm", "54 mm"):
+        put(page, place)
+        page.button("Pin").click()
+        page.page.get_by_text("now · the same").wait_for()
+    pins = page.page.locator("vcc-bench-pins li")
+    assert pins.count() == 3
+    assert "z 54 mm" in pins.nth(2).text_content()
+    assert "compared" in pins.nth(2).text_content()
+    assert "dB" in pins.nth(0).text_content()
+    page.button("Return to pinned state 1: main, code, sensor").click()
+    page.wait_for_place("sensor", "51 mm")
+    page.settle()
+    page.page.locator(".caption.right").get_by_text("dB").wait_for()
+    pins.nth(0).get_by_title("Compare with this state").click()
+    page.page.get_by_text("now · the same").wait_for()
+    page.button("Unpin 2").click()
+    page.page.wait_for_function("() => document.querySelector('vcc-bench').bench.pins.length === 2")
+    page.button("Undo").click()  # returning was one step
+    page.wait_for_place("sensor", "54 mm")
+
+
+def test_frames_of_a_sweep_are_gone_through_by_hand(page):
+    page.page.get_by_role("tab", name="sensor").click()
+    page.page.get_by_text("Export").click()
+    page.page.get_by_role("button", name="Film of a sweep").click()
+    page.page.locator('input[name="frames"]').fill("5")
+    page.button("Scrub by hand").click()
+    slider = page.page.get_by_label("Frame of the sweep")
+    slider.wait_for()
+    slider.focus()
+    pictures = [page.picture()]
+    for _ in range(4):
+        page.page.keyboard.press("ArrowRight")
+        page.page.wait_for_timeout(60)
+        pictures.append(page.picture())
+    assert all(one != other for one, other in itertools.pairwise(pictures))
+    assert slider.get_attribute("aria-valuetext") == "z 53 mm"
+    page.page.get_by_role("button", name="Close").click()
+    assert slider.count() == 0
+    assert page.place("sensor") == "52 mm"
+
+
+def test_photodiodes_stand_side_by_side(page):
+    page.page.get_by_role("tab", name="sensor").click()
+    page.page.locator("#sensor-photodiodes").fill("1, 2")
+    page.page.keyboard.press("Enter")
+    shows_two = "() => document.querySelector('vcc-bench').bench.picture.about.photodiodes[1] === 2"
+    page.page.wait_for_function(shows_two)
+    page.settle()
+    page.button("Levels").click()
+    page.page.get_by_label("photodiodes side by side").check()
+    page.page.get_by_text("1 × 2 photodiodes").wait_for()
+    assert page.page.evaluate("document.querySelector('vcc-bench').bench.picture.about.shape") == [60, 160]
+
+
+def test_ten_masks_of_many_cells_are_opened_and_the_connection_stands(page):
+    random = np.random.default_rng(1)
+    cells = [[[round(float(x), 4) for x in row] for row in random.uniform(0.2, 1, (128, 128))] for _ in range(10)]
+    masks = [
+        {"kind": "mask", "name": f"m{n}", "z": f"{2 + 4 * n} mm", "pattern": each, "width": "20 mm"}
+        for n, each in enumerate(cells)
+    ]
+    document = {"camera": {"elements": [CAMERA["elements"][0], *masks], "sensor": CAMERA["sensor"]}}
+    page.page.evaluate(
+        "given => document.querySelector('vcc-bench').bench.act({ do: 'load', document: given })",
+        {**document, "light_field": "scene"},
+    )
+    page.part("10").wait_for()
+    page.settle()
+    assert page.page.get_by_text("The server is gone").count() == 0
+    page.page.get_by_role("tab", name="sensor").click()
+    put(page, "51 mm")
+
+
+def test_places_in_fields_and_drawing_agree_while_the_server_is_away(page, served):
+    served.stop()
+    page.page.get_by_text("The server is gone").wait_for()
+    x, y = page.middle("sensor")
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 50, y, steps=4)
+    page.page.mouse.up()
+    drawn = page.place("sensor")
+    assert drawn != "52 mm"
+    assert page.page.locator("#sensor-z").input_value() == drawn.removesuffix(" mm")
+    served.start()
+    page.page.get_by_text("The server is gone").wait_for(state="detached")
+    page.settle()
+    assert page.place("sensor") == drawn
+
+
+def test_page_without_the_token_says_what_is_missing_and_does_not_try_for_ever(browser, served):
+    context = browser.new_context()
+    page = context.new_page()
+    opened = []
+    page.on("websocket", lambda socket: opened.append(socket))
+    page.goto(served.address.partition("?")[0])
+    page.get_by_text("This address lacks the token of the bench").wait_for()
+    page.wait_for_timeout(1500)
+    assert len(opened) == 1
+    context.close()
+
+
+def test_presets_have_pictures_and_open(browser):
+    from vcc.bench.cameras import SCENE, cameras, scenes
+    from vcc.bench.published import Gallery
+    from vcc.bench.starting import PRESETS, presets
+
+    gallery = Gallery(cameras(SCENE), SCENE)
+    found = presets(gallery)
+    assert list(found) == list(PRESETS)
+    assert len(found) == 6
+    bench = Served()
+    bench.offered = type(bench.offered)(
+        {name: field for name, field in scenes().items() if name == SCENE},
+        gallery["A lens"],
+        bench.offered.beside,
+        {title: gallery[title] for title in ("A lens", "A coded aperture")},
+        found,
+    )
+    bench.start()
+    page = Page(browser, bench.address)
+    page.page.get_by_text("Open", exact=True).click()
+    pictures = page.page.locator(".preset img")
+    assert pictures.count() == 6
+    assert pictures.evaluate_all("all => all.every(each => each.naturalWidth >= 100)")
+    page.page.locator(".preset").nth(1).click()
+    page.part("1").wait_for()
+    assert page.place("1") == "0 mm"
+    page.close()
+    bench.stop()
