@@ -145,7 +145,7 @@ RENDERERS = {
         'vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"',
     ),
     "splats": (
-        "Render 3D Gaussian splats: true views with occlusion, and the disparities of the middle one.\n\n"
+        "Render Gaussian splats: true views with occlusion, and the disparities of the middle one.\n\n"
         "--look lists cameras of the scene and draws a contact sheet of what they see.",
         "vcc synth splats room.ply --look",
         "vcc synth splats room.ply -o room.zarr --camera 3 --parallax 1",
