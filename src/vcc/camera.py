@@ -561,6 +561,7 @@ class Camera(Train):
             progress: called with (done, total) while disparities are estimated, if they are needed.
             options: as in `capture`.
         """
+        check_is_light_field(light_field)
         text = self._explained(light_field, How.of(how, options), executor, progress)
         section = lens_section(self, light_field.grid.wavelengths)
         return text.with_section(section) if section else text

@@ -157,12 +157,14 @@ def test_looks_are_its_own_but_light_or_dark_is_as_around_it(page):
 
 
 def test_it_says_when_python_does_not_answer_and_goes_on_when_it_does(page):
-    page.evaluate("() => { window.widgets[0].model.send = () => { throw Error('the kernel is gone') } }")
+    page.evaluate("""() => { const model = window.widgets[0].model; window.send = model.send;
+        model.send = () => { throw Error('the kernel is gone') } }""")
     page.locator('#one [data-part="sensor"]').focus()
     page.keyboard.press("ArrowRight")
     said = page.locator("#two").get_by_text("Python does not answer")
     said.wait_for()
-    page.evaluate("for (const each of window.widgets[0].model.handlers) each({is: 'heard'})")
+    page.evaluate("""() => { const model = window.widgets[0].model; model.send = window.send;
+        for (const each of model.handlers) each({is: 'heard'}) }""")
     said.wait_for(state="detached")
 
 

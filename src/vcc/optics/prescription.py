@@ -59,6 +59,8 @@ class Surface:
     material: Glass | None = None
 
     def __post_init__(self) -> None:
+        for each in dataclasses.fields(self):
+            checks.plain(f"{each.name} of surface {self.number}", getattr(self, each.name))
         terms = [float(term) for term in self.aspheres]
         while terms and terms[-1] == 0:
             terms.pop()
