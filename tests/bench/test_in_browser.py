@@ -10,28 +10,7 @@ from pathlib import Path
 import pytest
 
 import vcc
-from tests.bench.browser import AXE, Page, Served, chromium
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def served(browser):  # no server where there is no browser
-    bench = Served()
-    bench.start()
-    yield bench
-    bench.stop()
-
-
-@pytest.fixture
-def page(browser, served):
-    opened = Page(browser, served.address)
-    yield opened
-    opened.close()
+from tests.bench.browser import AXE, Page
 
 
 def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):

@@ -5,30 +5,8 @@ import itertools
 
 import numpy as np
 import PIL.Image
-import pytest
 
-from tests.bench.browser import CAMERA, Page, Served, chromium
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with chromium() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def served(browser):  # no server where there is no browser
-    bench = Served()
-    bench.start()
-    yield bench
-    bench.stop()
-
-
-@pytest.fixture
-def page(browser, served):
-    opened = Page(browser, served.address)
-    yield opened
-    opened.close()
+from tests.bench.browser import CAMERA, Page, Served
 
 
 def canvas(page):

@@ -83,6 +83,17 @@ def test_the_last_of_two_lenses_weighs_light_by_angle():
     assert both.values[0, 0] / alone.values[0, 0] == pytest.approx(1.02, abs=0.02)
 
 
+def test_what_touches_the_end_of_a_lens_counts_as_behind_it_however_places_round():
+    lens = vcc.load_lens("double-gauss-50mm", model="real", wavelength=587.56 * nm, f_number=4)
+    end = lens.z + lens.length
+    sensor, even = vcc.Sensor(end + 20 * mm, (6, 6), 0.2 * mm), field(EVEN, 90, 18e-3)
+    images = [
+        vcc.Camera([lens, vcc.Lens(30 * mm, z=end + off)], sensor).capture(even, samples=64).values
+        for off in (0.0, -1e-13)
+    ]
+    np.testing.assert_array_equal(*images)
+
+
 def test_irradiance_on_the_axis_is_that_of_the_cone_of_light():
     # Abbe: under a sky of radiance 1 the irradiance on the axis is π·sin²θ', θ' of the marginal ray.
     lens = vcc.RealLens.of(singlet(stop=10 * mm))

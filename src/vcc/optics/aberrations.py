@@ -58,7 +58,7 @@ class Aberrations(Value):
     def deflected(self, rays: Array) -> Array:
         """E of rays (..., 4) in plane a; rays that do not pass become NaN."""
         found, share = self.through(rays)
-        return np.where(share[..., None] > 0, self._from_b(found), np.nan)
+        return np.where(share[..., None] > 0, self._inverse(found), np.nan)
 
     def crossed(self, rays: Array) -> tuple[Array, Array]:
         """E of rays (..., 4) in plane a, and their light (...): 0 for rays that do not pass, which E puts at 0.
@@ -71,7 +71,7 @@ class Aberrations(Value):
         light = share * _cosine_fourth(rays)
         if not self.cosine_fourth:
             light = light / _cosine_fourth(found)
-        return np.where(share[..., None] > 0, self._from_b(found), 0.0), light
+        return np.where(share[..., None] > 0, self._inverse(found), 0.0), light
 
     @property
     @cached
@@ -106,9 +106,6 @@ class Aberrations(Value):
         away = np.abs(found - rays)[share > 0]
         x, y, s, t = (MARGIN * away.max(axis=0)).tolist() if len(away) else (0.0,) * 4
         return x, y, s, t
-
-    def _from_b(self, rays: Array) -> Array:
-        return np.asarray(self._inverse(rays))
 
     @property
     @cached

@@ -290,9 +290,10 @@ class Train(Value, Shown):
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
         for element, parts in met_in_order((*self.elements, *self._pixels)):
             if isinstance(element, RealLens):
-                if any(isinstance(later, RealLens) for later in self.elements[self.elements.index(element) + 1 :]):
+                behind = self._behind(element)
+                if any(isinstance(later, RealLens) for later in behind):
                     parts = replace(element, radiometry="paraxial").parts()  # the last lens weighs light by angle
-                parts = (*parts, *element.window(self._seen_from_sensor(element)))
+                parts = (*parts, *element.window(self._seen_from_sensor(element, behind)))
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in parts:
@@ -314,23 +315,18 @@ class Train(Value, Shown):
             here += element.length
         return tuple(stages), Affine.propagation(_distance(here, self.sensor.z)) @ approach
 
-    def _seen_from_sensor(self, lens: RealLens) -> Seen | None:
+    def _behind(self, element: Element) -> tuple[Element, ...]:
+        """The elements that light meets behind one of them."""
+        number = next(n for n, each in enumerate(self.elements) if each is element)
+        return self.elements[number + 1 :]
+
+    def _seen_from_sensor(self, lens: RealLens, behind: tuple[Element, ...]) -> Seen | None:
         """How the sensor sees the end of a real lens; None behind elements that are not affine or round."""
-        end = lens.z + lens.length
-        behind = [
-            each for each in self.elements if each is not lens and each.z >= end and not touch(each.z, lens.z)
-        ]
-        parts = [part for element in behind for part in element.parts()]
-        faces = [part for part in parts if isinstance(part, Faces)]
+        faces = [part for element in behind for part in element.parts() if isinstance(part, Faces)]
         if any(each.bending is not None or each.spread is not None for each in faces):
             return None
-        ray, here = Affine.identity(), end
-        for element in behind:
-            ray, here = Affine.propagation(element.z - here) @ ray, element.z + element.length
-            for part in element.parts():
-                step = part if isinstance(part, Affine) else part.affine
-                ray = ray if step is None else about(element.decentre, step) @ ray
-        ray = Affine.propagation(self.sensor.z - here) @ ray
+        to_end = Affine.propagation(lens.z + lens.length)
+        ray = Train(behind, self.sensor).rays_at(self.sensor.z) @ to_end.inverse()
         from_place, from_slope = ray.linear[:2, :2], ray.linear[:2, 2:]
         if not all(np.allclose(each, each[0, 0] * np.eye(2), atol=1e-12) for each in (from_place, from_slope)):
             return None
