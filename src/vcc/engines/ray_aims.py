@@ -140,27 +140,65 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
         flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
 
 
+@_inlined
+def visible_point(window, x, y, a, b):  # type: ignore[no-untyped-def]
+    """A point of the unit disc mapped on the part of the pupil that (x, y) sees, and the factor of its area.
+
+    See `vcc.optics.visible_pupil.VisiblePupil.mapped`.
+    """
+    table, (axis_x, axis_y), per_step = window.visible, window.axis, window.per_step
+    x, y = (x - axis_x) * per_step, (y - axis_y) * per_step
+    height = math.sqrt(x * x + y * y)
+    cosine, sine = (x / height, y / height) if height > 0.0 else (1.0, 0.0)
+    height = min(height, table.shape[0] - 1.0)
+    low = min(int(height), table.shape[0] - 2)
+    at = height - low
+    middle = (1.0 - at) * table[low, 0] + at * table[low + 1, 0]
+    half = (1.0 - at) * table[low, 1] + at * table[low + 1, 1]
+    across = (1.0 - at) * table[low, 2] + at * table[low + 1, 2]
+    along, aside = cosine * a + sine * b, cosine * b - sine * a
+    steps = table.shape[1] - 4
+    turn = (along / max(abs(along) + abs(aside), 1e-300) + 1.0) * 0.5 * steps
+    left = min(int(turn), steps - 1)
+    beside = turn - left
+    one = (1.0 - beside) * table[low, 3 + left] + beside * table[low, 4 + left]
+    other = (1.0 - beside) * table[low + 1, 3 + left] + beside * table[low + 1, 4 + left]
+    out = (1.0 - at) * one + at * other
+    along, aside = middle + half * out * along, across * out * aside
+    return cosine * along - sine * aside, sine * along + cosine * aside, half * across * out * out
+
+
 @_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, with diffusers compensated."""
     points, start, n, flipped = drawn
-    from_point, from_sensor, (f4, g4), solid_angle, disc, scatter = window
+    from_point, from_sensor, (f4, g4) = window.from_point, window.from_sensor, window.offset
+    solid_angle, disc, scatter, visible = window.solid_angle, window.disc, window.scatter, window.visible
     x, y, s, t, share = rays
     f0, f1, f2, f3 = from_point[0, 0], from_point[0, 1], from_sensor[0, 0], from_sensor[0, 1]
     g0, g1, g2, g3 = from_point[1, 0], from_point[1, 1], from_sensor[1, 0], from_sensor[1, 1]
-    if disc:  # rotated
-        turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
-        cosine, sine = math.cos(turn), math.sin(turn)
-        f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
-        g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
-    across, down = np.int32(flipped[2]), np.int32(flipped[3])
-    for p in range(n):
-        a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
-        if not disc:
-            a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
-        s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
-        t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
-        share[p] = solid_angle
+    turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
+    cosine, sine = math.cos(turn), math.sin(turn)
+    if len(visible) > 0:
+        for p in range(n):
+            a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
+            a, b = cosine * a - sine * b, sine * a + cosine * b
+            a, b, part = visible_point(window, x[p], y[p], a, b)
+            share[p] = part * solid_angle
+            s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
+            t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
+    else:
+        if disc:  # rotated
+            f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
+            g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
+        across, down = np.int32(flipped[2]), np.int32(flipped[3])
+        for p in range(n):
+            a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
+            if not disc:
+                a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
+            s[p] = f0 * a + f1 * b + f2 * x[p] + f3 * y[p] + f4
+            t[p] = g0 * a + g1 * b + g2 * x[p] + g3 * y[p] + g4
+            share[p] = solid_angle
     for term in range(len(scatter)):
         column = int(scatter[term, 0])
         f0, f1, g0, g1 = scatter[term, 1], scatter[term, 2], scatter[term, 3], scatter[term, 4]
@@ -247,7 +285,8 @@ def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
 def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type: ignore[no-untyped-def]
     """Gradients of slopes and weights through a window to positions, drawn points and its parameters."""
     points, start, n, flipped = drawn
-    _, from_sensor, _, _, disc, scatter = window
+    from_sensor, disc, scatter = window.from_sensor, window.disc, window.scatter
+    narrowed = len(window.visible) > 0
     turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
     cosine, sine = math.cos(turn), math.sin(turn)
     across, down = np.int32(flipped[2]), np.int32(flipped[3])
@@ -258,6 +297,8 @@ def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type:
             a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
             if disc:
                 a, b = cosine * a - sine * b, sine * a + cosine * b
+                if narrowed:
+                    a, b, _ = visible_point(window, rays[0, p], rays[1, p], a, b)
             else:
                 a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
             s0 += g * a
@@ -272,7 +313,8 @@ def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type:
         own[5 * q + 4] += s4
     weight = 0.0
     for p in range(n):
-        weight += bar[4, p]
+        # The share of the visible part, 1 without one: what the ray starts with.
+        weight += bar[4, p] * rays[4, p] / window.solid_angle
         bar[0, p] += from_sensor[0, 0] * bar[2, p] + from_sensor[1, 0] * bar[3, p]
         bar[1, p] += from_sensor[0, 1] * bar[2, p] + from_sensor[1, 1] * bar[3, p]
     own[10] += weight

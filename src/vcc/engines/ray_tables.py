@@ -107,6 +107,9 @@ class Window(NamedTuple):
         solid_angle: ∫∫ ds dt over the window.
         disc: whether the window is a disc.
         scatter: (diffusers, 5): column of the table, and slopes from the deflection by this diffuser.
+        visible: table of `vcc.optics.visible_pupil.VisiblePupil`, without rows if the disc is taken whole.
+        axis: place (x, y) on the sensor of its first row.
+        per_step: rows per metre.
     """
 
     from_point: Array
@@ -115,6 +118,9 @@ class Window(NamedTuple):
     solid_angle: float
     disc: bool
     scatter: Array
+    visible: Array
+    axis: Pair
+    per_step: float
 
 
 class Cells(NamedTuple):

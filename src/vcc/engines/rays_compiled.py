@@ -19,6 +19,7 @@ from vcc.engines.ray_patches import Patches, patches_of, rows_that_look
 from vcc.engines.ray_steps import FEW
 from vcc.engines.sharpening_kernels import Parts, ToSharpen
 from vcc.engines.vector_gather import LANES
+from vcc.optics.visible_pupil import VisiblePupil
 from vcc.plan.protocol import Partial
 from vcc.plan.rays.bounds.windows import Aim, CellWindows, Window
 from vcc.plan.rays.model import Rays
@@ -27,7 +28,8 @@ TILE = 32
 """Side, in pixels, of the tile that a thread works on: the samples that the tile reads stay in the cache."""
 
 _NOWHERE = (0.0, 0.0)
-NO_WINDOW = tables.Window(np.zeros((2, 2)), np.zeros((2, 2)), _NOWHERE, 0.0, False, np.zeros((0, 5)))
+ALL_VISIBLE = np.zeros((0, 0)), _NOWHERE, 0.0
+NO_WINDOW = tables.Window(np.zeros((2, 2)), np.zeros((2, 2)), _NOWHERE, 0.0, False, np.zeros((0, 5)), *ALL_VISIBLE)
 NO_CELLS = tables.Cells(
     0, np.zeros(6), np.zeros((0, 0, 3)), (0, 0), np.zeros((0, 2)), 0.0, False, *[_NOWHERE] * 10
 )
@@ -158,7 +160,12 @@ def _window(aim: Window) -> tables.Window:
         float(aim.solid_angle),
         bool(aim.disc),
         np.array(scatter).reshape(-1, 5),
+        *(ALL_VISIBLE if aim.visible is None else _visible(aim.visible)),
     )
+
+
+def _visible(part: VisiblePupil) -> tuple[NDArray[np.float64], tuple[float, float], float]:
+    return np.ascontiguousarray(part.table), _pair(part.axis), 1 / part.step
 
 
 def _cells(aim: CellWindows) -> tables.Cells:

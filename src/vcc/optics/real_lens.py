@@ -21,6 +21,7 @@ from vcc.optics.faces import Element, Faces, Part, Way
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.prescription import Prescription, Reference, Surface
 from vcc.optics.refraction import Refraction, traced
+from vcc.optics.visible_pupil import Passes, tables_of
 from vcc.shapes.patterns import Circle, Pattern
 
 Array = NDArray[np.float64]
@@ -296,21 +297,15 @@ class RealLens(Element):
             distance: of the plane, from the end of the element, metres.
             seen: how the sensor sees the end.
         """
-        # A place p on the sensor and a place q in the plane: p = A·x + B·s, q = x + distance·s.
-        gain = seen.from_slope - distance * seen.from_place
-        if abs(gain) < 1e-9:
+        passes = self._passes(distance, seen)
+        if passes is None:
             return None
-        back = _reversed(self.onward)
-        back = (replace(back[0], distance=-self._behind), *back[1:])
 
         def met(points: Array) -> Array:
             """How far out points (p, q, angle) are; -1 if light does not pass."""
-            p, q = points[:, 0], points[:, 1]
-            place = np.stack([q * np.cos(points[:, 2]), q * np.sin(points[:, 2])], axis=-1)
-            image = np.stack([p, np.zeros_like(p)], axis=-1)
-            slope = (image - seen.from_place * place) / gain
-            share = traced(back, np.concatenate([place - distance * slope, slope], axis=-1))[1]
-            return np.where(share > 0, q, -1.0)
+            p, q, angle = points.T
+            lit = passes(np.stack([p, q * np.cos(angle), q * np.sin(angle)], axis=-1))
+            return np.where(lit, q, -1.0)
 
         reach = 2 * self._stop_radius
         for _ in range(6):
@@ -326,8 +321,48 @@ class RealLens(Element):
             return None
         return _refined(points, met, np.array([seen.radius / 6, reach / 40, np.pi / 12]))
 
+    def _passes(self, distance: float, seen: Seen) -> Passes | None:
+        """Whether light for places p on the sensor passes places (a, b) in a plane, all in metres; see `Passes`.
+
+        None if the plane is imaged on the sensor. ``a`` is along the direction of p.
+        """
+        # A place p on the sensor and a place q in the plane: p = A·x + B·s, q = x + distance·s.
+        gain = seen.from_slope - distance * seen.from_place
+        if abs(gain) < 1e-9:
+            return None
+        back = list(_reversed(self.onward))
+        back[0] = replace(back[0], distance=-self._behind)
+        if self.mask is not None:  # no farther out than its corners
+            number = len(back) - 1 - (self.stop_number or 0)
+            back[number] = replace(back[number], radius=self._stop_radius)
+        surfaces = tuple(back)
+
+        def passes(points: Array) -> NDArray[np.bool_]:
+            place = points[:, 1:]
+            image = np.stack([points[:, 0], np.zeros(len(points))], axis=-1)
+            slope = (image - seen.from_place * place) / gain
+            rays = np.concatenate([place - distance * slope, slope], axis=-1)
+            return np.asarray(traced(surfaces, rays)[1] > 0)
+
+        return passes
+
+    def visible_pupil(self, seen: Seen, radius: float) -> Array | None:
+        """The part of the disc of `window` that places on the sensor see, as `vcc.optics.visible_pupil.tables_of`.
+
+        None for soft edges, which gradients need: then the part changes with the lens, and tables of it would too.
+
+        Args:
+            seen: how the sensor sees the end of the lens.
+            radius: of the disc, metres.
+        """
+        passes = self._passes(self._pupil_distance, seen)
+        if self.softness > 0 or passes is None:
+            return None
+        unit = np.array([1.0, radius, radius])
+        return tables_of(lambda points: passes(points * unit), seen.radius)
+
     def _widest(self, distance: float) -> float:
-        """The same for light that goes anywhere: rays from all over the stop in all directions."""
+        """As `_widest_seen`, for light that goes anywhere: rays from all over the stop in all directions."""
         number, onward = self.stop_number, self.onward
         assert number is not None
         to_stop, behind = onward[: number + 1], onward[number:]
@@ -411,11 +446,13 @@ class Seen:
     Args:
         from_place: likewise along y; both are relative to the ray along the lens's axis.
         from_slope: metres.
-        radius: of the disc around that ray's place that the sensor is within, metres.
+        axis: that ray's place (x, y), metres.
+        radius: of the disc around that place that the sensor is within, metres.
     """
 
     from_place: float
     from_slope: float
+    axis: tuple[float, float]
     radius: float
 
 

@@ -293,7 +293,7 @@ class Train(Value, Shown):
                 behind = self._behind(element)
                 if any(isinstance(later, RealLens) for later in behind):
                     parts = replace(element, radiometry="paraxial").parts()  # the last lens weighs light by angle
-                parts = (*parts, *element.window(self._seen_from_sensor(element, behind)))
+                parts = (*parts, *element.window(self.seen_from_sensor(element)))
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
             for part in parts:
@@ -320,8 +320,9 @@ class Train(Value, Shown):
         number = next(n for n, each in enumerate(self.elements) if each is element)
         return self.elements[number + 1 :]
 
-    def _seen_from_sensor(self, lens: RealLens, behind: tuple[Element, ...]) -> Seen | None:
+    def seen_from_sensor(self, lens: RealLens) -> Seen | None:
         """How the sensor sees the end of a real lens; None behind elements that are not affine or round."""
+        behind = self._behind(lens)
         faces = [part for element in behind for part in element.parts() if isinstance(part, Faces)]
         if any(each.bending is not None or each.spread is not None for each in faces):
             return None
@@ -333,7 +334,8 @@ class Train(Value, Shown):
         axis = ray(np.array([*lens.decentre, 0.0, 0.0]))[:2]
         half = np.array(self.sensor.size[::-1]) / 2
         corner = np.abs(np.array(self.sensor.decentre) - axis) + half
-        return Seen(float(from_place[0, 0]), float(from_slope[0, 0]), float(np.hypot(*corner)))
+        x, y = axis.tolist()
+        return Seen(float(from_place[0, 0]), float(from_slope[0, 0]), (x, y), float(np.hypot(*corner)))
 
     @property
     def _pixels(self) -> tuple[Element, ...]:

@@ -25,7 +25,8 @@ def parameters(thing: Any) -> dict[str, Array]:
 
     Args:
         thing: a core, an operator, or a tuple of them; dataclasses and tuples are traversed, integers, texts and
-            other values that are not floating-point are skipped. Arrays in double precision are not copied.
+            other values that are not floating-point are skipped, and so are fields whose metadata call them
+            ``constant``. Arrays in double precision are not copied.
     """
     return dict(_leaves(thing, ""))
 
@@ -48,7 +49,8 @@ def _parts(thing: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(thing, tuple):
         yield from ((f"[{n}]", part) for n, part in enumerate(thing))
     elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        yield from ((f".{field.name}", getattr(thing, field.name)) for field in dataclasses.fields(thing))
+        changing = (field for field in dataclasses.fields(thing) if not field.metadata.get("constant"))
+        yield from ((f".{field.name}", getattr(thing, field.name)) for field in changing)
 
 
 def _leaf(thing: Any) -> Array | None:

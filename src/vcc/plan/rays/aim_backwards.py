@@ -41,13 +41,14 @@ def aim_back(aim: Aim, rays: Bundle, cells: Cell | None, behind: Bundle) -> tupl
 
 def _window_back(aim: Window, rays: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
     slopes = np.stack([behind.s, behind.t]).reshape(2, -1)
-    at_window = np.stack([rays.points[..., 2], rays.points[..., 3]]).reshape(2, -1)
+    a, b, part = aim.aimed_at(rays.x, rays.y, rays.points)
+    at_window = np.stack([a, b]).reshape(2, -1)
     at_sensor = np.stack([rays.x, rays.y]).reshape(2, -1)
     (a, b), (c, d) = aim.slope_from_point
     cofactors = np.array([[d, -c], [-b, a]])  # d|det|/d(matrix), up to the sign
     per_determinant = (np.pi if aim.disc else 4.0) * np.sign(np.linalg.det(aim.slope_from_point))
     own = {
-        "slope_from_point": slopes @ at_window.T + behind.share.sum() * per_determinant * cofactors,
+        "slope_from_point": slopes @ at_window.T + (behind.share * part).sum() * per_determinant * cofactors,
         "slope_from_sensor": slopes @ at_sensor.T,
         "offset": slopes.sum(axis=1),
     }

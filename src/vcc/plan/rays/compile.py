@@ -19,8 +19,10 @@ from vcc.fields.grid import ALL, Block, Grid
 from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection
 from vcc.optics.faces import Element
+from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
+from vcc.optics.visible_pupil import VisiblePupil
 from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, gathered, give
 from vcc.plan.how import How
 from vcc.plan.model import Plan
@@ -156,7 +158,8 @@ class ByRays:
     @cached
     def aimed(self) -> Aimed:
         """The aim, and the regions in which rays then meet elements."""
-        return found(self.path) if self.choose_aim is None else aim_now(self.path, self.choose_aim)
+        aimed = found(self.path) if self.choose_aim is None else aim_now(self.path, self.choose_aim)
+        return replace(aimed, aim=_at_what_is_visible(self.path, aimed.aim, self.parts))
 
     @property
     @cached
@@ -398,6 +401,27 @@ def steps_met(
         tuple(linear for met in all_met for linear in met.linears),
         tuple(choices),
     )
+
+
+def _at_what_is_visible(path: Path, aim: Aim, parts: Parts) -> Aim:
+    """The aim, narrowed to what each pixel sees of it if it is the exit pupil of a real lens."""
+    train = path.train
+    for leg in path.legs:
+        lens = leg.stage.element
+        if isinstance(lens, RealLens):  # the last one: what is met first of it is its pupil, see `RealLens.window`
+            seen, disc = train.seen_from_sensor(lens), leg.stage.faces.pattern
+            if seen is None or not _is_aimed_at(aim, leg) or not isinstance(disc, Circle):
+                return aim
+            table = parts.part(
+                "visible part of the pupil",
+                partial(content, (lens, seen, disc.diameter)),
+                partial(lens.visible_pupil, seen, disc.diameter / 2),
+            )
+            if table is None:
+                return aim
+            assert isinstance(aim, Window)
+            return replace(aim, visible=VisiblePupil(table, seen.axis, seen.radius / (len(table) - 1)))
+    return aim
 
 
 def _is_aimed_at(aim: Aim, leg: Leg) -> bool:

@@ -124,6 +124,8 @@ def _moved_from(core: Rays, name: str) -> int:
 def _edges(core: Rays, pixels: int) -> list[_Edge]:
     """The edges that cut, in the order in which rays meet them."""
     core = core.more(min(core.samples, RAYS))
+    if isinstance(core.aim, Window) and core.aim.visible is not None:
+        core = replace(core, aim=replace(core.aim, visible=None))  # rays at what is visible meet no edge
     rows, columns = (np.unique(np.linspace(0, n - 1, pixels).round().astype(np.int64)) for n in core.raster_shape)
     pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
     rays, cells = core.aimed(pixel, core.block(pixel))

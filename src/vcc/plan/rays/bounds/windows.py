@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.optics.deflections import CellDeflection
+from vcc.optics.visible_pupil import VisiblePupil
 
 Array = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ class Window(Brief):
         disc: whether the window is the disc a² + b² ≤ 1, not the whole square.
         words: the target, as text.
         slope_from_scatter: (column of the table, 2×2) of each uniform diffuser before the window.
+        visible: the part of the disc that each place on the sensor sees; None for all of it.
     """
 
     slope_from_point: Array
@@ -44,6 +46,7 @@ class Window(Brief):
     disc: bool
     words: str
     slope_from_scatter: tuple[tuple[int, Array], ...] = ()
+    visible: VisiblePupil | None = None
 
     halvings: ClassVar[int] = 0
     """All of a pixel's rays go through it."""
@@ -55,19 +58,24 @@ class Window(Brief):
 
     @property
     def solid_angle(self) -> float:
-        """∫∫ ds dt over the window, the same for any place on the sensor."""
+        """∫∫ ds dt over the window, or over the whole disc, the same for any place on the sensor."""
         return (np.pi if self.disc else 4.0) * abs(float(np.linalg.det(self.slope_from_point)))
 
     def slopes(self, x: Array, y: Array, points: Array) -> tuple[Array, Array, Array]:
         """Slopes s, t of rays from places x, y towards the window, and the solid angle that they stand for."""
-        a, b = points[..., 2], points[..., 3]
+        a, b, part = self.aimed_at(x, y, points)
         p, q = self.slope_from_point, self.slope_from_sensor
         s = p[0, 0] * a + p[0, 1] * b + q[0, 0] * x + q[0, 1] * y + self.offset[0]
         t = p[1, 0] * a + p[1, 1] * b + q[1, 0] * x + q[1, 1] * y + self.offset[1]
         for column, matrix in self.slope_from_scatter:
             ds, dt = points[..., column], points[..., column + 1]
             s, t = s + matrix[0, 0] * ds + matrix[0, 1] * dt, t + matrix[1, 0] * ds + matrix[1, 1] * dt
-        return s, t, np.full(s.shape, self.solid_angle)
+        return s, t, np.broadcast_to(part * self.solid_angle, s.shape)
+
+    def aimed_at(self, x: Array, y: Array, points: Array) -> tuple[Array, Array, Array | float]:
+        """The window's points (a, b) that rays from places x, y go to, and their share of the window's area."""
+        a, b = points[..., 2], points[..., 3]
+        return (a, b, 1.0) if self.visible is None else self.visible.mapped(x, y, a, b)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
