@@ -21,20 +21,20 @@ def through_sphere(f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """A sphere or plane with a hard edge: no branches, so that the loop vectorises."""
     distance, c, ratio, edge, passes = f[0], f[1], f[3], f[4] * f[4], f[6]
     for p in range(n):
+        # Directions as long as (s, t, 1), so that no root is needed to make them units: `w` is their square.
         l, m = s[p], t[p]
+        w = 1.0 + l * l + m * m
         x0, y0 = x[p] + distance * l, y[p] + distance * m
-        along = 1.0 / math.sqrt(1.0 + l * l + m * m)
-        l, m = l * along, m * along
-        g = along - c * (x0 * l + y0 * m)
+        g = 1.0 - c * (x0 * l + y0 * m)
         height = c * (x0 * x0 + y0 * y0)
-        root = g * g - c * height
+        root = g * g - c * height * w
         arriving = math.sqrt(max(root, 0.0))
-        far = height / (g + arriving)
-        px, py, pz = x0 + far * l, y0 + far * m, far * along
-        rest = 1.0 - ratio * ratio * (1.0 - arriving * arriving)
+        pz = height / (g + arriving)
+        px, py = x0 + pz * l, y0 + pz * m
+        rest = w - ratio * ratio * (w - root)
         bend = math.sqrt(max(rest, 0.0)) - ratio * arriving
-        on = ratio * along - bend * (c * pz - 1.0)
-        l, m = (ratio * l - bend * c * px) / on, (ratio * m - bend * c * py) / on
+        per = 1.0 / (ratio - bend * (c * pz - 1.0))
+        l, m = (ratio * l - bend * c * px) * per, (ratio * m - bend * c * py) * per
         lit = (root > 0.0) & (rest > 0.0) & (px * px + py * py <= edge)
         x[p] = px - l * pz if lit else 0.0
         y[p] = py - m * pz if lit else 0.0
