@@ -47,6 +47,18 @@ def test_angular_fringes_follow_the_angle_not_the_slope():
     np.testing.assert_allclose(across, 0.5 * (1 + 0.8 * math.cos(0.4)), rtol=1e-12)
 
 
+def test_means_of_angular_fringes_over_small_cells():
+    # 12 points of Gauss-Legendre each way are exact for these to rounding.
+    places, weights = np.polynomial.legendre.leggauss(12)
+    x, y = np.linspace(-0.6, 0.6, 9), np.linspace(-0.4, 0.4, 7)[:, None]
+    for rotation in (0.0, 0.7, np.pi / 2):
+        fringes = AngularFringes(60.0, 0.4, 0.8, rotation=rotation)
+        for width, height in ((1e-6, 2e-6), (2e-5, 4e-4), (1.2e-2, 1e-5)):
+            grid = x[..., None, None] + width / 2 * places, y[..., None, None] + height / 2 * places[:, None]
+            expected = np.einsum("...ba,a,b->...", fringes(*grid), weights, weights) / 4
+            np.testing.assert_allclose(fringes.mean(x, y, width, height), expected, atol=1e-9)
+
+
 def test_a_louvre_passes_a_triangle_of_angles_on_average():
     # Over all places: the gap less the way across the walls, over the pitch.
     louvre = vcc.Louvre(pitch=1 * mm, height=5 * mm, wall=0.2 * mm, rotation=0.4)
