@@ -50,8 +50,11 @@ class AngularFringes(Pattern):
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Transmission at slopes x, y."""
-        slope = np.asarray(x, float) * math.cos(self.rotation) + np.asarray(y, float) * math.sin(self.rotation)
-        return np.asarray((1 + self.modulation * np.cos(self.frequency * np.arctan(slope) + self.phase)) / 2)
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        along = (x, math.cos(self.rotation)), (y, math.sin(self.rotation))
+        slope = sum(place * share for place, share in along if abs(share) > 1e-15)  # for one axis, few numbers
+        response = (1 + self.modulation * np.cos(self.frequency * np.arctan(slope) + self.phase)) / 2
+        return np.array(np.broadcast_to(response, np.broadcast_shapes(x.shape, y.shape)))
 
     def mean(self, x: ArrayLike, y: ArrayLike, width: float, height: float) -> Array:
         """Mean over rectangles: Gauss-Legendre quadrature where a few points give 1e-9, else a raster."""
@@ -65,12 +68,12 @@ class AngularFringes(Pattern):
 
 
 def _quadrature(fringes: AngularFringes, length: float) -> tuple[Array, Array] | None:
-    """Places, −½ to ½, and weights for means over a length of slope; None if four points do not suffice.
+    """Places, −½ to ½, and weights for means over a length of slope; None if eight points do not suffice.
 
     n points err by L²ⁿ·(n!)⁴/((2n + 1)·(2n)!³) times the derivative of order 2n, of which cos(β·atan(s)) has at
     most (β + 2n)²ⁿ.
     """
-    for number in range(1, 5):
+    for number in range(1, 9):
         order = 2 * number
         share = math.factorial(number) ** 4 / ((order + 1) * math.factorial(order) ** 3)
         if share * (abs(length) * (abs(fringes.frequency) + order)) ** order < 1e-9:
