@@ -721,7 +721,13 @@ def _sag(surface: Any, r: Array) -> tuple[Array, Array]:
 
 
 def _on_surface(place: Array, way: Array, surface: Any, vertex: float) -> Array:
-    """Where rays meet a surface: the secant method along the ray, from the plane of the vertex on."""
+    """Where rays meet a surface: of a sphere in closed form, else by secants from the plane of the vertex on."""
+    if not surface.conic and not surface.aspheres:
+        # c·|p + hw|² = 2(p + hw)_z with p from the vertex and |w| = 1; for c = 0 the same root is the plane's.
+        p, c = place - np.array([0.0, 0.0, vertex]).reshape(3, *[1] * (place.ndim - 1)), 1 / surface.radius
+        b, rest = c * (p * way).sum(axis=0) - way[2], c * (p * p).sum(axis=0) - 2 * p[2]
+        with np.errstate(invalid="ignore"):
+            return np.asarray(place - rest / (b + np.copysign(np.sqrt(b * b - c * rest), b)) * way)
 
     def above(h: Array) -> Array:
         at = place + h * way
@@ -735,6 +741,8 @@ def _on_surface(place: Array, way: Array, surface: Any, vertex: float) -> Array:
             step = np.where(g == f, 0.0, g * (other - one) / np.where(g == f, 1.0, g - f))
             one, f = other, g
             other = other - step
+            if not (np.abs(step) > 1e-15).any():  # metres
+                break
             g = above(other)
     return place + other * way
 

@@ -68,12 +68,13 @@ class Pattern(Shown, abc.ABC):
         """
         found = mean_by_raster(lambda a, b, _: self(a, b), self.size, x, y, width, height, FEWEST_PER_CELL)
         return (
-            self._mean_of_points(np.asarray(x, float), np.asarray(y, float), width, height)
+            self.mean_of_points(np.asarray(x, float), np.asarray(y, float), width, height)
             if found is None
             else found
         )
 
-    def _mean_of_points(self, x: Array, y: Array, width: float, height: float) -> Array:
+    def mean_of_points(self, x: Array, y: Array, width: float, height: float) -> Array:
+        """The mean of 4×4 points of each rectangle; arguments as for `mean`."""
         steps = (np.arange(4) + 0.5) / 4 - 0.5
         points = [self(x + a * width, y + b * height) for a in steps for b in steps]
         return np.asarray(np.mean(np.broadcast_arrays(*points), axis=0))
