@@ -70,7 +70,7 @@ def main() -> int:
         parts = asked.only.split(",")
         names = run.make_seeds(name for name in FORMATS if any(part in name for part in parts))
         bombs = [] if asked.no_bombs else [name for name in BOMBS if any(part in name for part in parts)]
-        run.go(map(run.bomb, bombs), float("inf"))
+        run.go(run.bombs(bombs), float("inf"))
         most = None if asked.rounds is None else asked.rounds * len(names)
         run.go(itertools.islice(run.mutants(names), most), asked.seconds)
         print(run)
@@ -80,7 +80,7 @@ def main() -> int:
 def again(run: Run, name: str) -> int:
     """One case in this process, so that its traceback is seen."""
     if name in BOMBS:
-        case = run.bomb(name)
+        (case,) = run.bombs([name])
     else:
         kind, _, number = name.rpartition(":")
         run.make_seeds([kind])

@@ -27,6 +27,8 @@ from vcc.base.reading import LONGEST_MESSAGE
 BLOAT = 2**30
 """Bytes of memory that an input of less than `SMALL` bytes may take."""
 SMALL = 10**6
+BOMBS_AT_ONCE = 24
+"""Bombs whose files are there at once."""
 FAULTS = ("crash", "hang", "leak", "silent", "bloat", "long")
 MUTATE: dict[str, Callable[[Path, bool, Random], tuple[str, bool]]] = {"lytro resigned": mutations.resigned}
 """Formats whose files are not changed blindly."""
@@ -125,24 +127,26 @@ class Run:
         Returns:
             The formats whose seeds are read; others are faults of their own.
         """
-        for name in names:
+        folders = {name: self._folder("seeds", name) for name in names}
+        _make((FORMATS[name].seed, folder) for name, folder in folders.items())
+        for name, folder in folders.items():
             made = FORMATS[name]
-            folder = self._folder("seeds", name)
             case = Case(name, name, folder, made.target, made.read, made.options, "the seed itself")
-            outcome = alone(lambda: (made.seed(folder) and {}) or {}, limit=False)  # noqa: B023
-            outcome = alone(case.work) if outcome["kind"] == "opened" else outcome
+            outcome = alone(case.work)
             if outcome["kind"] == "opened":
                 self.wholes[name] = outcome["digest"]
             else:
                 self._note("leak", case, outcome)
         return list(self.wholes)
 
-    def bomb(self, name: str) -> Case:
-        """A bomb, its files made."""
-        made = BOMBS[name]
-        folder = self._folder("bombs", name)
-        alone(lambda: (made.make(folder) and {}) or {}, limit=False)
-        return Case(name, "bombs", folder, made.target, made.read, made.options, name, made.refused)
+    def bombs(self, names: list[str]) -> Iterator[Case]:
+        """Bombs, the files of some made at once."""
+        for start in range(0, len(names), BOMBS_AT_ONCE):
+            some = {name: self._folder("bombs", name) for name in names[start : start + BOMBS_AT_ONCE]}
+            _make((BOMBS[name].make, folder) for name, folder in some.items())
+            for name, folder in some.items():
+                made = BOMBS[name]
+                yield Case(name, "bombs", folder, made.target, made.read, made.options, name, made.refused)
 
     def mutant(self, name: str, number: int) -> Case:
         """A seed changed, from the run's seed, the format and the number alone."""
@@ -244,11 +248,14 @@ def rooms() -> Iterator[Path]:
         yield Path(room)
 
 
-def _made(maker: Maker, folder: Path) -> Outcome:
-    """What comes of filling a folder, in a child: threads that libraries start would be in the way of forks."""
+def _make(makers: Iterable[tuple[Maker, Path]]) -> None:
+    """Fill folders in a child: threads that libraries start would be in the way of forks."""
 
     def work() -> Outcome:
-        maker(folder)
+        for maker, folder in makers:
+            maker(folder)
         return {}
 
-    return alone(work, limit=False)
+    outcome = alone(work, limit=False)
+    if outcome["kind"] != "opened":
+        raise RuntimeError(f"files for the fuzzer could not be made: {outcome}")
