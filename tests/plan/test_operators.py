@@ -103,37 +103,34 @@ def on_sensor(rng: np.random.Generator, kind: str) -> tuple[OnSensor, np.ndarray
     return OnSensor(guard, transmission, detail), raster
 
 
-def assert_adjoint(operator, x: np.ndarray, library=np.asarray) -> None:
-    """⟨A x, y⟩ = ⟨x, Aᵀ y⟩ for another random y."""
-    ahead = np.asarray(operator.apply(library(x)))
-    y = signed(np.random.default_rng(1), *ahead.shape)
-    back = operator.transpose(y)
-    assert back.shape == x.shape
-    left, right = float((ahead.astype(np.float64) * y).sum()), float((x * back).sum())
-    assert abs(left - right) <= ROUNDING[ahead.dtype] * np.linalg.norm(ahead) * np.linalg.norm(y)
+def assert_adjoint(operator, x: np.ndarray) -> None:
+    """⟨A x, y⟩ = ⟨x, Aᵀ y⟩ for another random y, in NumPy and in PyTorch."""
+    for library in (np.asarray, torch.asarray):
+        ahead = np.asarray(operator.apply(library(x)))
+        y = signed(np.random.default_rng(1), *ahead.shape)
+        back = operator.transpose(y)
+        assert back.shape == x.shape
+        left, right = float((ahead.astype(np.float64) * y).sum()), float((x * back).sum())
+        rounding = ROUNDING[ahead.dtype] * np.linalg.norm(ahead) * np.linalg.norm(y)
+        assert abs(left - right) <= rounding, (operator, x.shape, library)
 
 
-@pytest.mark.parametrize("library", [np.asarray, torch.asarray], ids=["numpy", "torch"])
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", list(BEFORE))
-def test_operators_on_samples_and_their_transposes(name, seed, library):
-    rng = np.random.default_rng(seed)
-    assert_adjoint(BEFORE[name](rng), drawn_samples(rng), library)
+def test_operators_on_samples_and_their_transposes(name):
+    for rng in map(np.random.default_rng, SEEDS):
+        assert_adjoint(BEFORE[name](rng), drawn_samples(rng))
 
 
-@pytest.mark.parametrize("library", [np.asarray, torch.asarray], ids=["numpy", "torch"])
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", list(AFTER))
-def test_operators_on_the_raster_and_their_transposes(name, seed, library):
-    rng = np.random.default_rng(seed)
-    assert_adjoint(AFTER[name](rng), drawn_raster(rng), library)
+def test_operators_on_the_raster_and_their_transposes(name):
+    for rng in map(np.random.default_rng, SEEDS):
+        assert_adjoint(AFTER[name](rng), drawn_raster(rng))
 
 
-@pytest.mark.parametrize("library", [np.asarray, torch.asarray], ids=["numpy", "torch"])
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("kind", list(ON_SENSOR))
-def test_the_sensors_part_and_its_transpose(kind, seed, library):
-    assert_adjoint(*on_sensor(np.random.default_rng(seed), kind), library)
+def test_the_sensors_part_and_its_transpose(kind):
+    for rng in map(np.random.default_rng, SEEDS):
+        assert_adjoint(*on_sensor(rng, kind))
 
 
 def test_operators_are_linear():
@@ -169,31 +166,28 @@ def assert_pulls_what_changes(operator, x: np.ndarray, rng: np.random.Generator)
         assert float((pulled[name] * step).sum()) == pytest.approx(expected, abs=4 * bound)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", [*BEFORE, *AFTER])
-def test_derivatives_of_operators_to_their_own_numbers(name, seed):
-    rng = np.random.default_rng(seed)
-    operator = (BEFORE | AFTER)[name](rng)
-    assert_pulls_what_changes(operator, drawn_samples(rng) if name in BEFORE else drawn_raster(rng), rng)
+def test_derivatives_of_operators_to_their_own_numbers(name):
+    for rng in map(np.random.default_rng, SEEDS):
+        operator = (BEFORE | AFTER)[name](rng)
+        assert_pulls_what_changes(operator, drawn_samples(rng) if name in BEFORE else drawn_raster(rng), rng)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("kind", list(ON_SENSOR))
-def test_derivatives_to_what_lies_against_the_sensor(kind, seed):
-    rng = np.random.default_rng(seed)
-    assert_pulls_what_changes(*on_sensor(rng, kind), rng)
+def test_derivatives_to_what_lies_against_the_sensor(kind):
+    for rng in map(np.random.default_rng, SEEDS):
+        assert_pulls_what_changes(*on_sensor(rng, kind), rng)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_lags_are_the_same_one_by_one_and_by_transforms(seed):
+def test_lags_are_the_same_one_by_one_and_by_transforms():
     """Any range of lags of arrays of any two sizes, beyond where they touch, too."""
-    rng = np.random.default_rng(seed)
-    channels = int(rng.integers(1, 4))
-    one, other = (signed(rng, *map(int, rng.integers(1, 15, 2)), channels) for _ in range(2))
-    lags = [range(int(first), int(first + count)) for first, count in rng.integers((-20, 1), (20, 20), (2, 2))]
-    found = correlation._by_transforms(one, other, *lags)
-    bound = ROUNDING[np.dtype(np.float64)] * np.linalg.norm(one) * np.linalg.norm(other)
-    np.testing.assert_allclose(found, correlation._one_by_one(one, other, *lags), atol=bound)
+    for rng in map(np.random.default_rng, SEEDS):
+        channels = int(rng.integers(1, 4))
+        one, other = (signed(rng, *map(int, rng.integers(1, 15, 2)), channels) for _ in range(2))
+        lags = [range(int(first), int(first + count)) for first, count in rng.integers((-20, 1), (20, 20), (2, 2))]
+        found = correlation._by_transforms(one, other, *lags)
+        bound = ROUNDING[np.dtype(np.float64)] * np.linalg.norm(one) * np.linalg.norm(other)
+        np.testing.assert_allclose(found, correlation._one_by_one(one, other, *lags), atol=bound)
 
 
 # --- the arrays of other libraries ---
@@ -207,22 +201,21 @@ def assert_same_on_torch(operator, x: np.ndarray) -> None:
     np.testing.assert_allclose(found.numpy(), expected, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", [*BEFORE, *AFTER, *ON_SENSOR])
-def test_torch_gets_what_numpy_gets(name, seed):
+def test_torch_gets_what_numpy_gets(name):
     """Random numbers of single precision; kernels of positive weights, whose sums round to 6e-8 of themselves."""
-    rng = np.random.default_rng(seed)
-    if name in ON_SENSOR:
-        operator, x = on_sensor(rng, name)
-    else:
-        operator = BEFORE[name](rng) if name in BEFORE else AFTER[name](rng)
-        x = drawn_samples(rng) if name in BEFORE else drawn_raster(rng)
-    if isinstance(operator, BlurViews | Blur):
-        kernel = np.abs(operator.kernel)
-        operator = replace(operator, kernel=kernel / kernel.sum())
-    if isinstance(operator, AlongAxes):
-        operator = replace(operator, down=np.abs(operator.down), across=np.abs(operator.across))
-    assert_same_on_torch(operator, np.abs(x).astype(np.float32))
+    for rng in map(np.random.default_rng, SEEDS):
+        if name in ON_SENSOR:
+            operator, x = on_sensor(rng, name)
+        else:
+            operator = BEFORE[name](rng) if name in BEFORE else AFTER[name](rng)
+            x = drawn_samples(rng) if name in BEFORE else drawn_raster(rng)
+        if isinstance(operator, BlurViews | Blur):
+            kernel = np.abs(operator.kernel)
+            operator = replace(operator, kernel=kernel / kernel.sum())
+        if isinstance(operator, AlongAxes):
+            operator = replace(operator, down=np.abs(operator.down), across=np.abs(operator.across))
+        assert_same_on_torch(operator, np.abs(x).astype(np.float32))
 
 
 def test_bytes_are_sharpened_alike_and_as_finely_as_they_are_kept():
@@ -241,16 +234,15 @@ def test_bytes_are_sharpened_alike_and_as_finely_as_they_are_kept():
 # --- shapes, types and blocks ---
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", list(BEFORE))
-def test_shapes_and_types_are_as_foretold(name, seed):
-    rng = np.random.default_rng(seed)
-    operator, values = BEFORE[name](rng), 50 * np.abs(drawn_samples(rng))
-    for kind in map(np.dtype, ("uint8", "uint16", "float16", "float32", "float64")):
-        found = operator.apply(values.astype(kind))
-        assert found.shape == operator.shape(values.shape)
-        assert found.dtype == operator.kept_as(kind)[0]
-    assert operator.block(Block.all_of(values.shape)).shape == operator.shape(values.shape[:4])
+def test_shapes_and_types_are_as_foretold(name):
+    for rng in map(np.random.default_rng, SEEDS):
+        operator, values = BEFORE[name](rng), 50 * np.abs(drawn_samples(rng))
+        for kind in map(np.dtype, ("uint8", "uint16", "float16", "float32", "float64")):
+            found = operator.apply(values.astype(kind))
+            assert found.shape == operator.shape(values.shape)
+            assert found.dtype == operator.kept_as(kind)[0]
+        assert operator.block(Block.all_of(values.shape)).shape == operator.shape(values.shape[:4])
 
 
 def cuts(length: int, rng: np.random.Generator) -> list[tuple[int, int]]:
@@ -266,20 +258,19 @@ def blocks_of(shape: tuple[int, ...], rng: np.random.Generator, columns_too: boo
     return [Block(*ranges) for ranges in itertools.product(*parts)]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", list(BEFORE))
-def test_blocks_add_up_to_the_whole(name, seed):
+def test_blocks_add_up_to_the_whole(name):
     """Each block alone, with as many rows beside it as the operator reaches, cut off again."""
-    rng = np.random.default_rng(seed)
-    operator, values = BEFORE[name](rng), drawn_samples(rng)
-    total = np.zeros(operator.shape(values.shape))
-    for block in blocks_of(values.shape, rng, columns_too=operator.reach == 0):
-        first, stop = block.pixel_rows
-        above, below = min(operator.reach, first), min(operator.reach, values.shape[2] - stop)
-        part = operator.apply(values[replace(block, pixel_rows=(first - above, stop + below)).slices])
-        total[operator.block(block).slices] += part[:, :, above : part.shape[2] - below]
-    whole = operator.apply(values)
-    np.testing.assert_allclose(total, whole, atol=10 * ROUNDING[whole.dtype] * np.abs(whole).max())
+    for rng in map(np.random.default_rng, SEEDS):
+        operator, values = BEFORE[name](rng), drawn_samples(rng)
+        total = np.zeros(operator.shape(values.shape))
+        for block in blocks_of(values.shape, rng, columns_too=operator.reach == 0):
+            first, stop = block.pixel_rows
+            above, below = min(operator.reach, first), min(operator.reach, values.shape[2] - stop)
+            part = operator.apply(values[replace(block, pixel_rows=(first - above, stop + below)).slices])
+            total[operator.block(block).slices] += part[:, :, above : part.shape[2] - below]
+        whole = operator.apply(values)
+        np.testing.assert_allclose(total, whole, atol=10 * ROUNDING[whole.dtype] * np.abs(whole).max())
 
 
 # --- filters ---
@@ -304,24 +295,23 @@ def test_a_blur_by_a_column_and_a_row_is_a_filter_along_the_axes():
     np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_merged_filters_change_nothing_on_the_sensor(seed):
+def test_merged_filters_change_nothing_on_the_sensor():
     """Light that one filter throws over the raster's border is lost to the next one, but not to both at once.
 
     So they differ as far from the border as both reach, and a plan's guard is as wide.
     """
-    rng = np.random.default_rng(seed)
-    one, two = AFTER["tents"](rng), AFTER["along axes"](rng)
-    reach = max(len(one.down), len(one.across)) // 2 + max(len(two.down), len(two.across)) // 2
-    raster = drawn_raster(rng, 2 * reach + 1)
-    on = OnSensor(reach, rng.random((raster.shape[0] - 2 * reach, raster.shape[1] - 2 * reach)))
-    blur = Blur(signed(rng, 3, 3), "blur")
-    assert [type(each) for each in merged((one, two, on))] == [AlongAxes, OnSensor]
-    assert list(merged((one, blur, two, on))) == [one, blur, two, on]
-    assert list(merged(())) == []
-    expected = finished((one, two, on), raster)
-    found = finished(tuple(merged((one, two, on))), raster)
-    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    for rng in map(np.random.default_rng, SEEDS):
+        one, two = AFTER["tents"](rng), AFTER["along axes"](rng)
+        reach = max(len(one.down), len(one.across)) // 2 + max(len(two.down), len(two.across)) // 2
+        raster = drawn_raster(rng, 2 * reach + 1)
+        on = OnSensor(reach, rng.random((raster.shape[0] - 2 * reach, raster.shape[1] - 2 * reach)))
+        blur = Blur(signed(rng, 3, 3), "blur")
+        assert [type(each) for each in merged((one, two, on))] == [AlongAxes, OnSensor]
+        assert list(merged((one, blur, two, on))) == [one, blur, two, on]
+        assert list(merged(())) == []
+        expected = finished((one, two, on), raster)
+        found = finished(tuple(merged((one, two, on))), raster)
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("half_width", [0, 0.2, 0.5, 1.0, 2.7, 40.0])
@@ -345,27 +335,26 @@ def test_operators_of_equal_weights_are_equal():
     assert SharpenViews((1424, -240, 40)) != SharpenViews((1424, -239, 39))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", list(BEFORE))
-def test_samples_are_made_of_those_that_are_named(name, seed):
+def test_samples_are_made_of_those_that_are_named(name):
     """By the transpose: what weighs in some rows and columns of what the core takes, and nothing beside it."""
-    rng = np.random.default_rng(seed)
-    operator = BEFORE[name](rng)
-    shape = (1, 1, int(rng.integers(12, 20)), int(rng.integers(12, 20)))
-    made = operator.shape(shape)
-    rows, columns = (np.sort(rng.choice(np.arange(2, n - 2), 2, replace=False)) for n in made[2:4])
-    taken = np.zeros(made)
-    view = tuple(before for before, _ in operator.halo[:2]) if isinstance(operator, DarkBorder) else (0, 0)
-    taken[view][rows[0] : rows[1], columns[0] : columns[1]] = rng.uniform(
-        1, 2, (np.diff(rows)[0], np.diff(columns)[0])
-    )
-    weighs = np.argwhere(np.abs(operator.transpose(taken)[0, 0]) > 1e-9)
-    found = operator.made_of(np.array([rows, columns]))
-    (top, bottom), (left, right) = np.clip(found, 0, np.array(shape[2:])[:, None])
-    if name == "views blurred beyond their size":
-        return  # kernels of random weights as wide as views may cancel
-    assert weighs.min(axis=0).tolist() == [top, left]
-    assert (weighs.max(axis=0) + 1).tolist() == [bottom, right]
+    for rng in map(np.random.default_rng, SEEDS):
+        operator = BEFORE[name](rng)
+        shape = (1, 1, int(rng.integers(12, 20)), int(rng.integers(12, 20)))
+        made = operator.shape(shape)
+        rows, columns = (np.sort(rng.choice(np.arange(2, n - 2), 2, replace=False)) for n in made[2:4])
+        taken = np.zeros(made)
+        view = tuple(before for before, _ in operator.halo[:2]) if isinstance(operator, DarkBorder) else (0, 0)
+        taken[view][rows[0] : rows[1], columns[0] : columns[1]] = rng.uniform(
+            1, 2, (np.diff(rows)[0], np.diff(columns)[0])
+        )
+        weighs = np.argwhere(np.abs(operator.transpose(taken)[0, 0]) > 1e-9)
+        found = operator.made_of(np.array([rows, columns]))
+        (top, bottom), (left, right) = np.clip(found, 0, np.array(shape[2:])[:, None])
+        if name == "views blurred beyond their size":
+            continue  # kernels of random weights as wide as views may cancel
+        assert weighs.min(axis=0).tolist() == [top, left]
+        assert (weighs.max(axis=0) + 1).tolist() == [bottom, right]
 
 
 def test_a_dark_border_stands_around_the_samples():
