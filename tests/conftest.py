@@ -26,20 +26,28 @@ if sys.platform == "linux" and hasattr(ctypes.CDLL(None), "mallopt"):
 
 LONGEST = (
     "tests/test_pages.py",
-    "tests/engines/test_plans_by_engines.py",
-    "tests/bench/test_in_browser.py",
     "tests/test_fuzz.py",
-    "tests/engines/test_agreement.py",
-    "tests/run/test_cluster.py",
     "tests/engines/test_cuda.py",
+    "tests/run/test_cluster.py",
+    "tests/bench/test_in_browser.py",
+    "tests/engines/test_plans_by_engines.py",
+    "tests/physics/test_random_cameras.py",
+    "tests/engines/test_agreement.py",
+    "tests/bench/test_viewer_in_browser.py",
+    "tests/bench/test_drawing_in_browser.py",
+    "tests/physics/test_diffusers_in_cameras.py",
+    "tests/physics/test_plenoptic.py",
+    "tests/physics/test_random_colour.py",
     "tests/cli/test_sweep_command.py",
     "tests/sweeps/test_kept.py",
-    "tests/physics/test_random_cameras.py",
-    "tests/physics/test_diffusers_in_cameras.py",
     "tests/demo/test_demo.py",
     "tests/test_notebooks.py",
 )
-"""Files that take longest, or begin processes: the first to be handed out, so that no worker is left with one."""
+"""Files that take longest, or begin processes: the first to be handed out, so that no worker is left with one.
+
+Pages and plans compile the same kernels: while a worker compiles those of the pages, others begin with what
+compiles none, and find them in the cache.
+"""
 
 
 def pytest_configure(config: pytest.Config) -> None:
