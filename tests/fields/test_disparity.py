@@ -24,7 +24,7 @@ def test_pieces_that_are_sent_are_treated_like_the_whole():
     piece = field[:, :2, 4:20:2]
     sent = pickle.loads(pickle.dumps(piece))
     np.testing.assert_array_equal(sent.values, piece.values)
-    assert (sent.frame, sent.sample, sent.whole_views) == (piece.frame, piece.sample, piece.whole_views)
+    assert (sent.frame, sent.sample, sent.grid.extent) == (piece.frame, piece.sample, piece.grid.extent)
     assert sent.measured_disparity_range() == piece.measured_disparity_range()
     assert sent.measured_disparity_range() != vcc.LightField(piece.values, piece.frame).measured_disparity_range()
 

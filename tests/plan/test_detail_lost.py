@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vcc.base.units import mm
 from vcc.plan.footprints.detail import _means_around, detail_lost
 from vcc.plan.footprints.planes import Plane
-from vcc.shapes.patterns import Cells, CosineSum
+from vcc.shapes.patterns import Cells, CosineSum, FunctionPattern
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -32,6 +34,9 @@ def test_of_cosines_as_much_as_their_mean_over_a_box_has_less_variance():
     parts = np.sinc(0.4) / np.sinc(0.4 / 8)
     # The variance of (1 + cos)/2 is half its mean squared.
     assert lost == pytest.approx((1 - parts**2) / 2, abs=0.02)
+    # Of a function, four points stand for a part: their mean is (π·0.4/8/4)²/6 = 3e-4 of the cosine too large.
+    function = replace(plane, pattern=FunctionPattern(lambda x, y: pattern(x, y)))
+    assert detail_lost(function, np.zeros(2), np.array([box, 0.0])) == pytest.approx(lost, rel=1e-3)
 
 
 @pytest.mark.parametrize("number", [100, 500, 600, 4000])

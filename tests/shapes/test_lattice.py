@@ -71,10 +71,10 @@ def test_neighbours_stand_one_pitch_away_and_cells_fill_the_plane(layout, neighb
     _, centres = centres_by_hand(lattice)
     from_centre = np.linalg.norm(centres - lattice.centre_of(0, 0), axis=1)
     assert np.isclose(from_centre, 0.7, rtol=1e-12).sum() == neighbours
-    assert lattice.cell_area == pytest.approx(area * 0.49, rel=1e-12)
+    assert lattice.pitch * lattice.row_height == pytest.approx(area * 0.49, rel=1e-12)
     x, y = lattice.corners.T
     shoelace = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
-    assert shoelace == pytest.approx(lattice.cell_area, rel=1e-12)
+    assert shoelace == pytest.approx(lattice.pitch * lattice.row_height, rel=1e-12)
     # Just inside its corners is the cell; just outside is another one.
     for row, column in ((0, 0), (3, -2)):
         for share, inside in ((0.999, True), (1.001, False)):

@@ -90,15 +90,6 @@ class OnGrid(Shown, ABC):
         return self.grid.filling
 
     @property
-    def whole_views(self) -> tuple[float, float]:
-        """(rows, columns) of views of the light field of which this is a piece, in this piece's steps.
-
-        Decisions of a camera that depend on the extent of the views are the same for all pieces, so that the
-        images of the pieces add up to the image of the whole.
-        """
-        return self.grid.extent
-
-    @property
     def sample_volume(self) -> float:
         """The phase-space volume du·dv·ds·dt of one sample's cell, m² (slopes have no unit)."""
         return self.grid.sample_volume

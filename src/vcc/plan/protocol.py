@@ -102,16 +102,6 @@ class Gradient(Brief):
         )
 
 
-class Runner(Protocol):
-    """Function that runs a core on samples."""
-
-    def __call__(
-        self, core: Any, values: Any, *, beside: int = 0, threads: int, progress: Progress | None = None
-    ) -> Partial:
-        """See `Engine.run`."""
-        ...
-
-
 @dataclass(frozen=True)
 class Abilities:
     """Features of an engine, known before it is loaded.

@@ -57,11 +57,6 @@ class Lattice:
         return self.pitch * ROW_HEIGHT[self.layout]
 
     @property
-    def cell_area(self) -> float:
-        """The area of a cell, m²."""
-        return self.pitch * self.row_height
-
-    @property
     def half_size(self) -> tuple[float, float]:
         """Half the (width, height) of an unrotated cell, metres."""
         return self.pitch / 2, self.pitch / (2 if self.layout == "square" else math.sqrt(3))
