@@ -295,7 +295,7 @@ def divide_samples(
     """
     size = float(np.abs(geometry.on_sensor[:, 2:]).sum(axis=1).max())
 
-    @cache  # takes a fifth of a second for a user's function
+    @cache  # takes a tenth of a second for a user's function
     def left(number: int, parts: int) -> SampleDivision:
         plane = planes[number]
         sample = np.abs(plane.sample_step).sum(axis=1) / parts

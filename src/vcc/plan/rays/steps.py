@@ -383,11 +383,10 @@ class Cosines:
 
     def __call__(self, rays: Bundle) -> None:
         """Weight rays by ½ + Σ cos(nθ)/2h along each axis."""
-        orders = np.arange(1, self.harmonics + 1)
         for place, middle, frequency in zip((rays.x, rays.y), self.middle, self.frequency, strict=True):
             if frequency > 0:
                 angle = frequency * (place - middle) + self.phase
-                total = np.cos(angle[..., None] * orders).sum(axis=-1)
+                total = sum(np.cos(order * angle) for order in range(1, self.harmonics + 1))
                 rays.share = rays.share * (0.5 + total / (2 * self.harmonics))
 
     def packed(self, packer: Packer) -> None:
