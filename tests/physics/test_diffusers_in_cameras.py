@@ -105,14 +105,19 @@ RULES = {
 }
 
 
+@cache
+def without_diffuser(rule: str) -> vcc.Image:
+    elements = RULES[rule](KERNELS["disc"])
+    return capture([one for one in elements if not isinstance(one, vcc.Diffuser)], in_focus(BLOB), WIDE)
+
+
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 @pytest.mark.parametrize("rule", RULES)
 def test_a_diffuser_conserves_light(rule, kernel):
-    lf, elements = in_focus(BLOB), RULES[rule](kernel)
-    camera = vcc.Camera(elements, WIDE)
-    assert any(rule in note for note in camera.compile(lf).notes)
-    without = vcc.Camera([one for one in elements if not isinstance(one, vcc.Diffuser)], WIDE).capture(lf)
-    blurred = camera.capture(lf)
+    lf, camera = in_focus(BLOB), vcc.Camera(RULES[rule](kernel), WIDE)
+    plan = camera.compile(lf)
+    assert any(rule in note for note in plan.notes)
+    without, blurred = without_diffuser(rule), camera.capture(lf, plan=plan)
     # ∫ radiance = 2πσ² over the plane, seen by the stop under the solid angle side²/distance²; the plane's
     # samples are 8 to σ, so that their sum is the integral to exp(−2π²·8²), and tents keep it.
     total = 2 * np.pi * BLOB.sigma**2 * DIAMETER**2 / FOCUS**2
@@ -151,15 +156,21 @@ def test_a_coded_diffuser_conserves_light():
 # -- at the sensor
 
 
+@cache
+def without_diffuser_at_the_sensor(**options) -> vcc.Image:
+    return capture([LENS], PLANES.light_field, PICTURE, **options)
+
+
 @pytest.mark.parametrize("kernel", KERNELS.values(), ids=KERNELS)
 def test_a_diffuser_at_the_sensor_changes_nothing(kernel):
     diffuser = vcc.Diffuser(kernel=kernel, z=D)
-    without = capture([LENS], PLANES.light_field, PICTURE)
     np.testing.assert_allclose(
-        capture([LENS, diffuser], PLANES.light_field, PICTURE).values, without.values, rtol=1e-6
+        capture([LENS, diffuser], PLANES.light_field, PICTURE).values,
+        without_diffuser_at_the_sensor().values,
+        rtol=1e-6,
     )
     rays = capture([LENS, diffuser], PLANES.light_field, PICTURE, method="rays", samples=512)
-    plain = capture([LENS], PLANES.light_field, PICTURE, method="rays", samples=512)
+    plain = without_diffuser_at_the_sensor(method="rays", samples=512)
     # Two independent errors; the estimate from halves is known to 1/√(2·224) = 5 %.
     error = np.sqrt(np.mean((rays.values - plain.values) ** 2))
     assert error <= 1.2 * np.hypot(rays.sampling_error, plain.sampling_error)
@@ -230,18 +241,25 @@ def test_a_gaussian_diffuser_takes_from_cosines_what_the_closed_form_says(place,
             assert new / old == pytest.approx(expected, abs=4 * noise + 1e-5)
 
 
+METHODS = {
+    "auto": {},
+    "linear": {"interpolation": "linear"},
+    "rays": {"method": "rays", "samples": 2048},
+}
+
+
+@cache
+def spot(method: str) -> vcc.Image:
+    """Without a diffuser."""
+    return capture([LENS], in_focus(BLOB), WIDE, **METHODS[method])
+
+
 @pytest.mark.parametrize("name", ["disc", "square", "array"])
-@pytest.mark.parametrize("method", ["auto", "linear", "rays"])
+@pytest.mark.parametrize("method", METHODS)
 def test_moments_of_a_blurred_spot_are_those_of_the_kernel(name, method):
     kernel = KERNELS[name]
-    lf = in_focus(BLOB)
     diffuser = vcc.Diffuser(kernel=kernel, z=0.1 * D)
-    options = {
-        "auto": {},
-        "linear": {"interpolation": "linear"},
-        "rays": {"method": "rays", "samples": 2048},
-    }[method]
-    images = [capture([LENS, *more], lf, WIDE, **options) for more in ([], [diffuser])]
+    images = [spot(method), capture([LENS, diffuser], in_focus(BLOB), WIDE, **METHODS[method])]
     moments = []
     for image in images:
         light = image.values.astype(np.float64) / image.values.sum(dtype=np.float64)
