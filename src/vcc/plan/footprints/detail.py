@@ -28,7 +28,7 @@ def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: floa
         return product_of_means(pattern.factors, x, y, width, height)
     plain = pattern.pattern if isinstance(pattern, Shifted) else pattern
     if type(plain).mean is Pattern.mean:
-        # No closed form: a raster has four times as many points, which change the loss by 2 % at most.
+        # No closed form: a raster has four times as many points, which changed no loss by more than 2 %.
         return pattern.mean_of_points(x, y, width, height)
     return pattern.mean(x, y, width, height)
 
