@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
     from vcc.optics import Pyramid as Pyramid
+    from vcc.optics import RayTable as RayTable
+    from vcc.optics import RayTableLens as RayTableLens
     from vcc.optics import RealLens as RealLens
     from vcc.optics import Term as Term
     from vcc.optics.electronics import Electronics as Electronics
@@ -66,6 +68,8 @@ _HOMES = {
     "Element": "vcc.optics",
     "Faces": "vcc.optics",
     "FirstOrder": "vcc.optics",
+    "RayTable": "vcc.optics",
+    "RayTableLens": "vcc.optics",
     "RealLens": "vcc.optics",
     "How": "vcc.plan.how",
     "Image": "vcc.image",

@@ -15,6 +15,7 @@ import pytest
 import torch
 
 import vcc
+from tests.optics.traced_tables import thin_table
 from vcc.base.units import mm
 from vcc.optics import Element, Faces, Lattice
 from vcc.optics.prescription import Prescription, Surface
@@ -103,6 +104,7 @@ ELEMENTS = {
     ],
     "gaps": [Gaps(z=20 * mm)],
     "thick": [vcc.FirstOrder.thick_lens((60 * mm, -50 * mm), 4 * mm, 1.5, z=2 * mm, decentre=(0.3 * mm, 0))],
+    "ray table": [vcc.RayTableLens(thin_table(40 * mm, 6 * mm, 0.2, 2000), z=2 * mm, decentre=(0.2 * mm, 0.0))],
     "real lens": [
         vcc.RealLens.of(
             Prescription(

@@ -32,6 +32,8 @@ from vcc import (
     Prism,
     PrismArray,
     Pyramid,
+    RayTable,
+    RayTableLens,
     RealLens,
     ResultWarning,
     Sensor,
@@ -234,6 +236,7 @@ EVERYTHING = Camera(
             dispersion=False,
             fresnel=True,
         ),
+        RayTableLens(RayTable(RANDOM.random((200, 8)), 1 / 3 * mm, 1 * um), "paraxial", z=40 * mm),
         FirstOrder(Affine.prism((0.1, 0)).matrix, entrance_diameter=3 * mm, exit_diameter=2 * mm, z=30 * mm),
         LensArray(125 * um, 1 / 3 * mm, z=49 * mm),
         LensArray(
@@ -288,8 +291,9 @@ def test_round_trip_is_exact(tmp_path):
         "everything_phase_plate_27_heights.npy",
         "everything_measured_path_paths.npy",
         "everything_prism_array_32_slopes.npy",
-        "everything_mask_49.npy",
-        "everything_mask_49_2.npy",
+        "everything_ray_table_lens_36_rays.npy",
+        "everything_mask_50.npy",
+        "everything_mask_50_2.npy",
     }
 
 
@@ -320,6 +324,7 @@ def test_names_are_those_of_the_classes():
         "prism",
         "prism_array",
         "pyramid",
+        "ray_table_lens",
         "real_lens",
     ]
     assert list(KERNEL_NAMES) == ["gaussian", "top_hat", "radial", "samples"]

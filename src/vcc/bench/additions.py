@@ -185,7 +185,7 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
 
 LENSLET_PIXELS = 8
 """Pixels of the sensor across a new lenslet."""
-FROM_FILES = ("real_lens",)
+FROM_FILES = ("ray_table_lens",)
 """Kinds that a bench shows and changes, but cannot add."""
 IN_GAPS = ("lens", "first_order")
 BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")

@@ -16,6 +16,7 @@ import numpy as np
 
 from vcc.engines.compiled import compiled
 from vcc.engines.interpolation import around, bilinear
+from vcc.engines.ray_maps import map_back, through_map
 from vcc.engines.ray_surfaces import surface_back, through_surface
 from vcc.engines.ray_tables import Packet, Steps
 
@@ -238,6 +239,8 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                         share[p] *= 0.5 + total / (2 * a[0])
         elif code == 13:
             through_surface(a, f, n, x, y, s, t, share)
+        elif code == 15:
+            through_map(a, f, slopes[a[3] :], n, x, y, s, t, share)
         elif code == 14:
             for p in range(n):
                 per_square = 1.0 / (1.0 + s[p] * s[p] + t[p] * t[p])
@@ -276,7 +279,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
         for p in range(n):
             behind[q, p] = before[q, p]
     # The step runs on shares of one: a share that becomes zero there was stopped, not zero before.
-    hole = code == 3 or code == 11 or code == 6 or code == 7 or code == 13
+    hole = code == 3 or code == 11 or code == 6 or code == 7 or code == 13 or code == 15
     if hole:
         for p in range(n):
             behind[4, p] = 1.0
@@ -445,6 +448,8 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             gw[p] *= cosines_x * cosines_y
     elif code == 13:
         surface_back(a, f, n, before, bar, own)
+    elif code == 15:
+        map_back(a, f, slopes[a[3] :], n, before, bar)
     elif code == 14:
         for p in range(n):
             per_square = 1.0 / (1.0 + before[2, p] * before[2, p] + before[3, p] * before[3, p])

@@ -22,7 +22,7 @@ from vcc import optics
 from vcc.base.describe import kind_in_words
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.optics import Element, FirstOrder, RealLens, glass
+from vcc.optics import Element, FirstOrder, RayTableLens, RealLens, glass
 from vcc.optics.glass import Glass
 from vcc.optics.prescription import Reference
 from vcc.prescriptions import load_lens
@@ -203,7 +203,33 @@ class _RealLensFile:
         return None
 
 
-FROM_FILES: dict[type[Element], Any] = {FirstOrder: _LensFile, RealLens: _RealLensFile}
+@dataclasses.dataclass(frozen=True)
+class _RayTableFile:
+    """`vcc.load_lens` with ``model="ray table"`` in a camera file; it is saved with its rays."""
+
+    lens_file: str
+    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    accuracy: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    radiometry: str = "exact"
+    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
+    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
+    name: str = ""
+
+    def made(self, folder: Path) -> RayTableLens:
+        fields = dataclasses.fields(self)[1:]
+        given = {field.name: value for field in fields if (value := getattr(self, field.name)) is not None}
+        return load_lens(folder / expanded(self.lens_file), model="ray table", **given)
+
+    @classmethod
+    def of(cls, lens: RayTableLens, folder: Path) -> None:
+        return None
+
+
+FROM_FILES: dict[type[Element], Any] = {
+    FirstOrder: _LensFile,
+    RealLens: _RealLensFile,
+    RayTableLens: _RayTableFile,
+}
 """Elements that a separate lens file can describe: the form to read if its first field is given."""
 
 

@@ -12,6 +12,7 @@ from vcc.optics.mask import Mask
 from vcc.optics.phase_plate import PhasePlate, SurfaceDeflection
 from vcc.optics.pixels import Microlens
 from vcc.optics.prisms import Biprism, Prism, Pyramid
+from vcc.optics.ray_table import RayTable, RayTableLens
 from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.terms import Term
@@ -41,6 +42,8 @@ __all__ = [
     "PrismArray",
     "Pupil",
     "Pyramid",
+    "RayTable",
+    "RayTableLens",
     "RealLens",
     "Scatter",
     "SheetMap",

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.values import Value
+from vcc.optics.ray_map import RayMap
 from vcc.optics.refraction import Refraction, traced
 
 Array = NDArray[np.float64]
@@ -30,7 +31,8 @@ class Aberrations(Value):
     """The surfaces between two planes across the axis, in coordinates centred on the lens.
 
     Args:
-        onward: the surfaces as light meets them, from plane a on.
+        onward: the surfaces as light meets them, from plane a on; of a lens without a prescription, one map of
+            rays.
         ending: from the last surface's vertex to plane b, metres.
         back: the surfaces as rays traced back from plane b meet them.
         beginning: from the first surface's vertex to plane a, metres, mostly negative or 0.
@@ -38,9 +40,9 @@ class Aberrations(Value):
         cosine_fourth: whether light behind plane b counts by exact angles rather than by slopes.
     """
 
-    onward: tuple[Refraction, ...]
+    onward: tuple[Refraction | RayMap, ...]
     ending: float
-    back: tuple[Refraction, ...]
+    back: tuple[Refraction | RayMap, ...]
     beginning: float
     first_order: Affine
     cosine_fourth: bool = False
@@ -76,11 +78,8 @@ class Aberrations(Value):
     @property
     @cached
     def without_rims(self) -> Aberrations:
-        """The same surfaces without their clear diameters."""
-        free = (
-            tuple(replace(each, radius=np.inf, softness=0.0) for each in way) for way in (self.onward, self.back)
-        )
-        onward, back = free
+        """The same surfaces without their clear diameters; maps of rays stay as they are."""
+        onward, back = (tuple(each.without_rim() for each in way) for way in (self.onward, self.back))
         return replace(self, onward=onward, back=back)
 
     def shares(self, rays: Array) -> Array:

@@ -23,8 +23,10 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
 from vcc.optics.bands import single_way
 from vcc.optics.faces import Faces
+from vcc.optics.ray_map import RayMap
+from vcc.optics.ray_table import TRACED, RayTableLens
 from vcc.optics.real_lens import RealLens
-from vcc.optics.refraction import traced
+from vcc.optics.refraction import Refraction, traced
 from vcc.optics.train import Stage, Train
 
 Array = NDArray[np.float64]
@@ -133,7 +135,7 @@ def light_stages(train: Train) -> list[Stage]:
     found = list(train.stages)
     for number, stage in enumerate(found):
         last = number + 1 == len(found) or found[number + 1].element is not stage.element
-        if isinstance(stage.element, RealLens) and stage.faces.bending is None and last:
+        if isinstance(stage.element, TRACED) and stage.faces.bending is None and last:
             found[number] = replace(stage, faces=Faces())
     return found
 
@@ -228,9 +230,15 @@ class Stop(Brief):
 
     @classmethod
     def of(cls, train: Train) -> Stop:
-        """The stop of the first real lens, else the opening that limits slopes most, else the entrance plane."""
+        """The stop of the first real lens, else the opening that limits slopes most, else the entrance plane.
+
+        The stop of a lens known by a table of rays is where its light is narrowest, from the middle of its
+        opening.
+        """
         for number, stage in enumerate(train.stages):
             lens = stage.element
+            if isinstance(lens, RayTableLens) and isinstance(stage.faces.bending, Aberrations):
+                return cls(number, 1, lens.table.maps[0].map.radius)
             if isinstance(lens, RealLens) and isinstance(stage.faces.bending, Aberrations):
                 if lens.mask is not None:
                     return cls(number + 1, 0, _stop_radius(lens))
@@ -261,7 +269,10 @@ class Stop(Brief):
         if not self.surfaces:
             return np.asarray(rays[..., :2])
         assert isinstance(stage.faces.bending, Aberrations)
+        if isinstance(entry := stage.faces.bending.onward[0], RayMap):
+            return entry.widest * entry.aside(*entry.variables(*np.moveaxis(rays, -1, 0)))
         *before, surface = stage.faces.bending.without_rims.onward[: self.surfaces]
+        assert isinstance(surface, Refraction)
         found, share = traced(tuple(before), rays)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             met = surface.met(*np.moveaxis(found, -1, 0))
@@ -397,7 +408,6 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
     """Where to search for light through a real lens: its first rim, else four times its entrance pupil."""
     low, high = box
     lens, bending = stage.element, stage.faces.bending
-    assert isinstance(lens, RealLens)
     assert isinstance(bending, Aberrations)
     first = bending.onward[0]
     vertex = Affine.propagation(first.distance) @ stage.arriving
@@ -407,6 +417,7 @@ def _into_lens(stage: Stage, distance: float, field: Any, box: Box) -> Box:
         aside = abs(sag if math.isfinite(sag) else first.radius) * np.abs(chief[2:])
         back, reach = _entrance_from(vertex, distance, field), first.radius + aside
     else:
+        assert isinstance(lens, RealLens)
         matrix = lens.prescription.stop_from_entrance
         pupil = (
             lens.prescription.opened(lens.stop_diameter).first_order().entrance_pupil

@@ -6,8 +6,8 @@ side, so one function traces with the light and against it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,10 @@ class Refraction(Brief):
         bend = leaving - self.ratio * arriving
         to = [self.ratio * one + bend * other for one, other in zip((l, m, n), normal, strict=True)]
         return Met(px, py, pz, to[0] / to[2], to[1] / to[2], arriving, leaving)
+
+    def without_rim(self) -> Self:
+        """The surface without its clear diameter."""
+        return replace(self, radius=np.inf, softness=0.0)
 
     def sag(self, square: Array) -> tuple[Array, Array]:
         """The sag z, and its derivative to r², for places r² = x² + y²."""

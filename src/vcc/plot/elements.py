@@ -24,6 +24,7 @@ from vcc.optics import (
     Lens,
     Louvre,
     Prism,
+    RayTableLens,
     RealLens,
     Scatter,
 )
@@ -108,6 +109,8 @@ def half_size(element: Element, axis: int) -> float:
     if isinstance(element, RealLens):
         rims = [surface.radius for surface in element.onward if math.isfinite(surface.radius)]
         return max([*rims, *([element.mask.size[axis] / 2] if element.mask is not None else [])])
+    if isinstance(element, RayTableLens):
+        return element.half_size
     halves = []
     for crossing in crossings(element):
         half = half_opening(crossing.faces, axis)

@@ -22,6 +22,7 @@ from vcc.optics import (
     Prism,
     PrismArray,
     Pyramid,
+    RayTableLens,
     RealLens,
 )
 from vcc.optics.train import Train
@@ -212,4 +213,5 @@ _WORDS: dict[type[Any], Callable[[Any, Span], list[str]]] = {
     CodedDiffuser: _scatter_words,
     FirstOrder: _system_words,
     RealLens: lambda lens, pen: _system_words(lens.first_order, pen),
+    RayTableLens: lambda lens, pen: _system_words(lens.first_order, pen),
 }

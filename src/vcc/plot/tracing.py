@@ -185,7 +185,9 @@ class _Bundle:
             self.share = self.share * stage.faces.pattern(x, y)
         for term in stage.faces.terms:
             self.share = self.share * term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
-        self.rays = stage.deflected(self.rays)
+        bent = stage.deflected(self.rays)
+        going = np.asarray(np.isfinite(bent).all(axis=1))  # others are outside the opening of a table of rays
+        self.rays, self.share = np.where(going[:, None], bent, self.rays), np.where(going, self.share, 0.0)
         if stage.faces.spread is not None and split_along is not None:
             with stage.named():
                 scattered = branches(stage.faces.spread, split_along, x, y)

@@ -9,7 +9,7 @@ import dataclasses
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal, overload
+from typing import Any, Literal, get_args, overload
 
 from vcc.base import checks
 from vcc.base.errors import InputError
@@ -18,12 +18,15 @@ from vcc.base.wavelengths import D_LINE
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.glass import Glass
 from vcc.optics.prescription import Prescription, Reference, Surface, qcon
+from vcc.optics.ray_table import RayTableLens
 from vcc.optics.real_lens import RealLens
-from vcc.prescriptions import codev, json_files, pbrt, zemax
+from vcc.prescriptions import codev, json_files, pbrt, ray_tables, zemax
 from vcc.prescriptions.media import Media
 
 __all__ = ["Prescription", "Surface", "built_in_lenses", "load_lens", "qcon", "read_prescription"]
 
+Model = Literal["first order", "real", "ray table"]
+"""What a lens is made of: its first order, its surfaces, or rays."""
 _READERS = {
     ".dat": pbrt.read,
     ".json": json_files.read_optiland,
@@ -64,7 +67,7 @@ def read_prescription(
     if reader is None:
         raise InputError(
             f"{file} is not a lens prescription that can be read: known are {', '.join(_FORMATS)}, and the names "
-            f"{', '.join(built_in_lenses())}"
+            f'{", ".join(built_in_lenses())}; tables of rays (.csv) with model="ray table"'
         )
     if own:
         file = _BUILT_IN / f"{file.name}.seq"
@@ -91,10 +94,14 @@ def load_lens(path: str | PathLike[str], *, model: Literal["first order"] = ...,
 def load_lens(path: str | PathLike[str], *, model: Literal["real"], **options: Any) -> RealLens: ...
 
 
+@overload
+def load_lens(path: str | PathLike[str], *, model: Literal["ray table"], **options: Any) -> RayTableLens: ...
+
+
 def load_lens(
     path: str | PathLike[str],
     *,
-    model: Literal["first order", "real"] = "first order",
+    model: Model = "first order",
     z: float = 0.0,
     z_of: Reference = "first surface",
     stop_diameter: float | None = None,
@@ -106,7 +113,7 @@ def load_lens(
     decentre: tuple[float, float] = (0.0, 0.0),
     name: str = "",
     **real: Any,
-) -> FirstOrder | RealLens:
+) -> FirstOrder | RealLens | RayTableLens:
     """Read a lens; light passes its surfaces in the order of the file.
 
     ``model="first order"``: paraxial. Principal planes, focal length, stop and pupils are those of the lens;
@@ -116,11 +123,14 @@ def load_lens(
     ``model="real"``: each ray is refracted by each surface, see `vcc.RealLens`: aberrations, vignetting by all
     rims, exact irradiance, and colour where the file names its glasses.
 
+    ``model="ray table"``: a lens without a prescription, from a table of its rays (``.csv``) or a ray transfer
+    function of ISET (``.json``), see `vcc.RayTable` and the page on real lenses. Its first plane stands at ``z``.
+
     To focus by first order: ``vcc.Sensor(z=lens.z + lens.length + lens.image_distance(2.0), …)``.
 
     Args:
         path: a file or a name, as in `read_prescription`.
-        model: ``"first order"`` or ``"real"``.
+        model: ``"first order"``, ``"real"`` or ``"ray table"``.
         z: position of the first surface, or of the reference ``z_of``, metres.
         z_of: ``"first surface"``, or ``"entrance pupil"``: with z = 0, the entrance pupil is in the plane of
             the light field's views, with the lens's glass in front of it; see
@@ -136,7 +146,8 @@ def load_lens(
         decentre: position (x, y) of the lens's axis, metres.
         name: name in messages and plots.
         real: of a real lens: ``mask``, ``radiometry``, ``transmission``, ``fresnel`` and ``softness`` of
-            `vcc.RealLens`.
+            `vcc.RealLens`. Of a ray table: ``accuracy`` of `vcc.RayTable` and ``radiometry``; of the other options
+            it has ``z``, ``wavelength``, ``decentre`` and ``name``.
 
     Warns:
         ResultWarning: the stop is opened wider than in the file.
@@ -144,7 +155,12 @@ def load_lens(
     Raises:
         InputError: as in `read_prescription`, `Prescription.first_order` and `vcc.RealLens`.
     """
-    checks.one_of("model", model, ("first order", "real"))
+    checks.one_of("model", model, get_args(Model))
+    if model == "ray table":
+        options: dict[str, Any] = {"z_of": None if z_of == "first surface" else z_of}
+        options |= {"stop_diameter": stop_diameter, "f_number": f_number, "glasses": glasses, "rims": rims}
+        options |= {"configuration": configuration, **real}
+        return _ray_table_lens(path, wavelength, options, {"z": z, "decentre": decentre, "name": name})
     given = D_LINE if wavelength is None else wavelength
     prescription = read_prescription(path, wavelength=given, glasses=glasses, configuration=configuration)
     placed: dict[str, Any] = {"z": z, "z_of": z_of, "stop_diameter": stop_diameter, "f_number": f_number}
@@ -158,3 +174,20 @@ def load_lens(
         if rims is not None:
             raise InputError("rims belongs to first-order lenses: in a real lens all rims limit the light")
         return RealLens.of(prescription, **placed, dispersion=wavelength is None, **real)
+
+
+def _ray_table_lens(
+    path: str | PathLike[str], wavelength: float | None, given: dict[str, Any], placed: dict[str, Any]
+) -> RayTableLens:
+    """A lens from a table of rays."""
+    given = {option: value for option, value in given.items() if value is not None}
+    accuracy, radiometry = given.pop("accuracy", None), given.pop("radiometry", "exact")
+    if given:
+        raise InputError(
+            f"{next(iter(given))} is no option of a lens known by its rays: they hold for one stop, one "
+            "configuration and one wavelength"
+        )
+    file = expanded(path)
+    with reading(path, "a table of rays"):
+        table = ray_tables.read(file, wavelength, accuracy)
+        return RayTableLens(table, radiometry, source=file.name, **placed)

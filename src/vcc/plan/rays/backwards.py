@@ -225,6 +225,13 @@ def _refract(step: steps.Refract, before: Bundle, behind: Bundle) -> tuple[Bundl
     return replace(behind, x=x, y=y, s=s, t=t, share=behind.share * share), own
 
 
+def _mapped(step: steps.MapRays, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
+    arriving = before.x, before.y, before.s, before.t
+    x, y, s, t = step.pulled(arriving, (behind.x, behind.y, behind.s, behind.t))
+    lit = step.passes(*step.variables(*arriving))
+    return replace(behind, x=x, y=y, s=s, t=t, share=behind.share * lit), {}
+
+
 _BACK: dict[type, Callable[[Any, Bundle, Bundle], tuple[Bundle, Numbers]]] = {
     steps.Move: _move,
     steps.CellsUnbend: _cells,
@@ -239,5 +246,6 @@ _BACK: dict[type, Callable[[Any, Bundle, Bundle], tuple[Bundle, Numbers]]] = {
     steps.TextureShares: _mask,
     steps.Unscatter: _diffuser,
     steps.Refract: _refract,
+    steps.MapRays: _mapped,
     steps.CosineFourth: _cosine_fourth,
 }

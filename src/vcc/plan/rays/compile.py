@@ -19,6 +19,7 @@ from vcc.fields.grid import ALL, Block, Grid
 from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection
 from vcc.optics.faces import Element
+from vcc.optics.ray_map import RayMap
 from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.train import Stage, Train
@@ -495,8 +496,12 @@ def _surfaces(lens: Aberrations, element: Element, pending: Affine) -> list[step
     made: list[steps.Step] = [steps.Move(to_last)]
     if lens.cosine_fourth:
         made.append(steps.CosineFourth(f"the fall-off of light behind {element.label}"))
-    words = f"the surfaces of {element.label}"
-    return made + [steps.Refract(**vars(surface), words=words) for surface in lens.back]
+    for surface in lens.back:
+        if isinstance(surface, RayMap):
+            made.append(steps.MapRays(**vars(surface), words=f"the opening of {element.label}"))
+        else:
+            made.append(steps.Refract(**vars(surface), words=f"the surfaces of {element.label}"))
+    return made
 
 
 def _deflection(met: _Met) -> steps.Step:

@@ -31,7 +31,15 @@ EDGES: dict[type, tuple[str, ...]] = {
 """Parameters of steps that move only an edge: there is no derivative to them."""
 BORDERS: dict[type, tuple[str, ...]] = {**EDGES, steps.CellsUnbend: ("lattice", "decentre")}
 """Parameters of steps that move an edge, among other effects."""
-MOVING = (steps.Move, steps.CellsUnbend, steps.FacetsUnbend, steps.TextureUnbend, steps.Unscatter, steps.Refract)
+MOVING = (
+    steps.Move,
+    steps.CellsUnbend,
+    steps.FacetsUnbend,
+    steps.TextureUnbend,
+    steps.Unscatter,
+    steps.Refract,
+    steps.MapRays,
+)
 """Steps that move rays; other steps weight them."""
 PIXELS = 16
 """Pixels a side of the sensor whose rays are tested."""
@@ -71,15 +79,22 @@ def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: i
 
 
 def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
-    """Raise an error for parameters that move only a hard edge that cuts rays.
+    """Raise an error for parameters that move only a hard edge that cuts rays, and for those of a fitted map.
 
     Args:
         core: the rays.
         wanted: names of parameters to differentiate.
 
     Raises:
-        InputError: one of them moves such an edge, named.
+        InputError: one of them moves such an edge, named, or belongs to a map of rays.
     """
+    for name in wanted:
+        number = int(name.removeprefix("steps[").split("]")[0]) if name.startswith("steps[") else 0
+        if name.startswith("steps[") and isinstance(core.steps[number], steps.MapRays):
+            raise InputError(
+                f"there is no derivative to {name}: the map of a lens known by a table of rays is fitted to "
+                "them, and stays as it is. Learn the lens's place, and what stands around it"
+            )
     of_edges = [(name, n) for name in wanted for n, step in enumerate(core.steps) if _names(name, n, step, EDGES)]
     cutting = {edge.number: edge.words for edge in _edges(core, PIXELS)} if of_edges else {}
     for name, n in of_edges:
@@ -166,7 +181,7 @@ def _cut(step: Step, before: Bundle, behind: Bundle, cells: Cell | None) -> str:
     """The edge of a step that cuts the arriving light, as text; empty if none does."""
     lit = before.share > 0
     match step:
-        case steps.Disc() | steps.Rectangle() | steps.CellGaps() | steps.BlockOfCells():
+        case steps.Disc() | steps.Rectangle() | steps.CellGaps() | steps.BlockOfCells() | steps.MapRays():
             return step.words if (behind.share[lit] == 0).any() else ""
         case steps.Refract(softness=softness):
             return step.words if softness == 0 and (behind.share[lit] == 0).any() else ""

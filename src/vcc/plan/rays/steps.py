@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.lookup import bilinear
+from vcc.optics.ray_map import RayMap
 from vcc.optics.refraction import Refraction
 from vcc.shapes.lattice import Lattice
 
@@ -479,6 +480,25 @@ class Refract(Refraction):
         )  # fmt: skip
         whole = [int(self.fresnel), len(self.aspheres)]
         packer.step(self.code, whole, [*numbers, 0.0, *self.aspheres.tolist()])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MapRays(RayMap):
+    """A lens known by a table of rays, met against the light; see `vcc.optics.ray_map.RayMap`."""
+
+    words: str = ""
+    code: ClassVar[int] = 15
+
+    def __call__(self, rays: Bundle) -> None:
+        """Map the rays, and stop those outside its opening."""
+        rays.x, rays.y, rays.s, rays.t, share = self.refracted(rays.x, rays.y, rays.s, rays.t)
+        rays.share = rays.share * share
+
+    def packed(self, packer: Packer) -> None:
+        """The degree; units, centre, and the two tables: of openings, and of coefficients by term."""
+        tables = packer.slopes(np.concatenate([self.opening.reshape(-1), self.coefficients.T.reshape(-1)]))
+        whole = [self.order, self.opening.shape[0], self.opening.shape[1], tables]
+        packer.step(self.code, whole, [self.distance, self.steepest, self.widest, 0.0, *self.centre.tolist()])
 
 
 @dataclass(frozen=True)
