@@ -24,7 +24,7 @@ from vcc.optics.band import Band
 from vcc.optics.bands import SameWay, single_way, trains_of
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
-from vcc.optics.focusing import By, focused_train, refocused_train
+from vcc.optics.focusing import By, focused_train, moved_train, refocused_train
 from vcc.optics.plenoptic import Plenoptic
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -129,8 +129,9 @@ class Camera(Train):
         by: By = "first order",
         frequency: float | None = None,
         fields: Sequence[float] = (0.0,),
+        moves: str = "sensor",
     ) -> Self:
-        """The same camera with its sensor at the plane where a point is sharp.
+        """The same camera with its sensor at the plane where a point is sharp, or with a lens moved instead.
 
         Args:
             distance: Z, from the point to the entrance plane, metres, positive; ``math.inf`` for a distant scene.
@@ -141,11 +142,17 @@ class Camera(Train):
             fields: of ``"spot"`` and ``"mtf"``: which points count, alike: their images' distances from the middle
                 of the sensor, as fractions of its half diagonal. The default is the axis alone. The lines F, d
                 and C count alike where the camera disperses.
+            moves: ``"sensor"``, or the name of an element as in `Camera.replace`: it moves along the axis, and the
+                sensor and the entrance plane, from which ``distance`` counts, stay.
 
         Raises:
             InputError: as for `Camera.focused`; by real rays: nothing bounds the light, a diffuser, or a field
-                without light.
+                without light; no such element, or no place of it that focuses the point.
         """
+        if moves != "sensor":
+            place = _place_of(moves, self.elements)
+            moved = moved_train(self.elements, self.sensor, distance, by, frequency, fields, moves=place)
+            return type(self)(moved.elements, moved.sensor, name=self.name)
         train = refocused_train(self.elements, self.sensor, distance, by, frequency, fields)
         return type(self)(train.elements, train.sensor, name=self.name)
 

@@ -211,3 +211,37 @@ def test_axes_that_focus_elsewhere_are_told_with_their_places():
 def test_what_spreads_the_light_is_named_with_a_way_out(elements, distance, message):
     with pytest.raises(vcc.InputError, match=message):
         vcc.Camera.focused(elements, SENSOR, distance)
+
+
+# --- a lens that moves instead ---
+
+
+def test_a_lens_moves_before_a_sensor_that_stays():
+    """d² − L·d + L·f = 0 for the distance d from lens to sensor, with L from the point to the sensor."""
+    sensor = vcc.Sensor(z=60 * mm, shape=(40, 60), pitch=10 * um)
+    camera = vcc.Camera(
+        [vcc.Lens(50 * mm, z=4 * mm, name="prime"), vcc.Mask(np.eye(3), 5 * mm)], sensor, name="one"
+    )
+    for distance in (0.3, 2.0):
+        moved = camera.focused_at(distance, moves="prime")
+        length = distance + sensor.z
+        behind = (length - math.sqrt(length**2 - 4 * length * 50 * mm)) / 2
+        lens = next(each for each in moved.elements if each.name == "prime")
+        assert sensor.z - lens.z == pytest.approx(behind, abs=2e-7)
+        assert (moved.sensor, moved.name, len(moved.elements)) == (sensor, "one", 2)
+    with pytest.raises(
+        vcc.InputError, match=r'no place of lens "prime" is found that focuses a point 100 mm away'
+    ):
+        camera.focused_at(0.1, moves="prime")  # L < 4f
+    with pytest.raises(vcc.InputError, match=r"no element is called 'lens'"):
+        camera.focused_at(2.0, moves="lens")
+
+
+def test_a_real_lens_moves_to_its_best_focus():
+    lens = vcc.load_lens("triplet-100mm", model="real", z=10 * mm)
+    sensor = vcc.Sensor(z=lens.focus_z + 5 * mm, shape=(20, 30), pitch=1 * mm)
+    moved = vcc.Camera([lens], sensor).focused_at(3.0, by="spot", moves="real_lens")
+    assert moved.focused_at(3.0, by="spot").sensor.z == pytest.approx(sensor.z, abs=1e-7)
+    assert 0 < moved.elements[0].z != lens.z
+    with pytest.raises(vcc.InputError, match=r"a lens alone has no focus: .*moves="):
+        vcc.load_lens("triplet-100mm", model="real", focus=3.0)

@@ -22,6 +22,8 @@ By = Literal["first order", "spot", "mtf"]
 """What a focus makes best."""
 _FAR = 1e9
 """Metres; a place behind all elements."""
+_SHARP, _TRIES = 1e-7, 12
+"""Metres between sensor and focus at which an element has its place; most places that are tried."""
 _PARALLEL = 1e-9
 """Slopes per metre of aperture, 1/m, below which light is treated as parallel: an image 10⁹ m away."""
 _ALIKE = 1e-6
@@ -90,6 +92,61 @@ def refocused_train(
     bundles = [bundle(one, distance, point) for point in points for one in trains]
     z = train.sensor.z + sharpest_shift(bundles, by, frequency)
     return Train(train.elements, _at(sensor, z))
+
+
+def moved_train(
+    elements: Sequence[Element],
+    sensor: Sensor,
+    distance: float,
+    by: By,
+    frequency: float | None = None,
+    fields: Sequence[float] = (0.0,),
+    *,
+    moves: int,
+) -> Train:
+    """A train with an element moved along the axis so that points are sharp on the sensor, which stays.
+
+    An image at magnification m follows its lens by the share 1 − m² of the lens's way, so that the secant method
+    from m = 0 finds the place; two places focus a point, and this is the one where the image is smaller.
+
+    Args:
+        elements: as in `refocused_train`.
+        sensor: likewise; its z counts.
+        distance: from the entrance plane, which stays too.
+        by: likewise.
+        frequency: likewise.
+        fields: likewise.
+        moves: the number of the element that moves.
+
+    Raises:
+        InputError: as in `refocused_train`, or no place of the element is found.
+    """
+
+    def at(shift: float) -> list[Element]:
+        moved = replace(elements[moves], z=elements[moves].z + shift)
+        return [moved if number == moves else each for number, each in enumerate(elements)]
+
+    def missed(shift: float) -> float:
+        return refocused_train(at(shift), sensor, distance, by, frequency, fields).sensor.z - sensor.z
+
+    label = elements[moves].label
+    try:
+        shifts = [0.0, -missed(0.0)]
+        off = [-shifts[1], missed(shifts[1])]
+        while abs(off[-1]) > _SHARP and len(off) < _TRIES and off[-1] != off[-2]:
+            slope = (off[-1] - off[-2]) / (shifts[-1] - shifts[-2])
+            shifts.append(shifts[-1] - off[-1] / slope)
+            off.append(missed(shifts[-1]))
+    except InputError as error:
+        raise InputError(
+            f"no place of {label} is found that focuses {_point(distance)} on the sensor: {error}"
+        ) from None
+    if abs(off[-1]) > _SHARP:
+        raise InputError(
+            f"no place of {label} is found that focuses {_point(distance)} on the sensor at z = "
+            f"{short(sensor.z)}: move the sensor, or take a point farther away"
+        )
+    return Train(at(shifts[-1]), sensor)
 
 
 def check_by(by: str, frequency: float | None) -> None:

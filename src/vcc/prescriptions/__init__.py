@@ -156,6 +156,11 @@ def load_lens(
         InputError: as in `read_prescription`, `Prescription.first_order` and `vcc.RealLens`.
     """
     checks.one_of("model", model, get_args(Model))
+    if "focus" in real:
+        raise InputError(
+            "a lens alone has no focus: put it in a camera, and move it before the sensor, camera.focused_at(2.0, "
+            'moves="real_lens"), or the sensor behind it, camera.focused_at(2.0)'
+        )
     if model == "ray table":
         options: dict[str, Any] = {"z_of": None if z_of == "first surface" else z_of}
         options |= {"stop_diameter": stop_diameter, "f_number": f_number, "glasses": glasses, "rims": rims}
