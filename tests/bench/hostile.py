@@ -93,7 +93,7 @@ def cameras() -> list[Json]:
     elements = [
         additions.new_element(kind["kind"], z, described.train, set())
         for kind in additions.kinds()
-        if kind["addable"]
+        if kind["addable"] and kind["parameters"]  # lenses by name do not fit everywhere
         for z in ("26 mm", "0 mm")
     ]
     found = [{**CAMERA, "elements": [*CAMERA["elements"], each]} for each in elements]  # type: ignore[misc]

@@ -151,7 +151,15 @@ def test_elements_are_added_copied_and_removed(client):
 
 def test_kind_that_comes_from_a_file_is_not_added_and_the_way_out_is_named(client):
     client.do("add", kind="real_lens", z="13 mm")
-    assert "comes from a lens file" in client.until("refused")[0]["words"]
+    assert "comes from a lens file: add one of achromat-100mm" in client.until("refused")[0]["words"]
+
+
+def test_a_real_lens_is_added_by_name_with_its_surfaces(client):
+    client.do("add", kind="phone-4mm", z=None)
+    state, _ = client.until("state", "refused")
+    assert state["is"] == "state", state
+    (table,) = (each for each in state["document"]["camera"]["elements"] if each["kind"] == "real_lens")
+    assert (table["name"], len(table["prescription"]["surfaces"]) > 5) == ("phone-4mm", True)
 
 
 @pytest.mark.parametrize("kind", [kind for kind in ELEMENT_KINDS if kind not in FROM_FILES])

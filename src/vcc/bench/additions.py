@@ -11,7 +11,7 @@ import re
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import MISSING, Field, is_dataclass
+from dataclasses import MISSING, Field, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
@@ -32,9 +32,11 @@ from vcc.files.camera_families import (
     unit_of,
 )
 from vcc.files.camera_reading import Beside, TrainAsWritten, read_array
-from vcc.optics import FirstOrder, Lens
+from vcc.files.camera_writing import NOWHERE, tables_of_train
+from vcc.optics import FirstOrder, Lens, RealLens
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
+from vcc.prescriptions import built_in_lenses, load_lens
 
 Json = dict[str, Any]
 
@@ -45,8 +47,18 @@ _ARRAY_LIKE = set(get_args(ArrayLike))
 
 @functools.cache
 def kinds() -> list[Json]:
-    """All kinds of elements, with their parameters."""
-    return [_kind(name, kind) | {"addable": name not in FROM_FILES} for name, kind in ELEMENT_KINDS.items()]
+    """All kinds of elements, with their parameters, and the real lenses that can be added by name."""
+    listed = [_kind(name, kind) | {"addable": name not in FROM_FILES} for name, kind in ELEMENT_KINDS.items()]
+    lenses = [
+        {"kind": name, "words": f"A real lens: {_real_lens(name).described()}.", "parameters": [], "addable": True}
+        for name in built_in_lenses()
+    ]
+    return listed + lenses
+
+
+@functools.cache
+def _real_lens(name: str) -> RealLens:
+    return load_lens(name, model="real")
 
 
 @functools.cache
@@ -158,7 +170,7 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
     """The table of a new element, with parameters that suit its position.
 
     Args:
-        kind: its name in camera files.
+        kind: its name in camera files, or one of `vcc.prescriptions.built_in_lenses`.
         z: its position, a length as text; None for one that suits its kind.
         train: the camera that it is added to.
         names: of the elements that exist.
@@ -166,12 +178,14 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
     Raises:
         InputError: unknown kind, or z is not a length.
     """
+    if isinstance(kind, str) and kind in built_in_lenses():
+        return _new_real_lens(kind, z, train, names)
     if not isinstance(kind, str) or kind not in ELEMENT_KINDS:
         raise InputError(f"unknown kind of element {shown(kind)}: use one of {', '.join(ELEMENT_KINDS)}")
     if kind in FROM_FILES:
         raise InputError(
-            f"a {kind.replace('_', ' ')} comes from a lens file: name it in the camera file with which you start "
-            "the bench, or open a camera that has one"
+            f"a {kind.replace('_', ' ')} comes from a lens file: add one of {', '.join(built_in_lenses())}, name "
+            "a file in the camera file with which you start the bench, or open a camera that has one"
         )
     place = _suitable_place(kind, train) if z is None else units.parse(z, "length", "z")
     given = _length(place, 6) if z is None else z
@@ -183,11 +197,22 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
     return table | ({} if make is None else make(long, wide))
 
 
+def _new_real_lens(kind: str, z: Any, train: Train, names: AbstractSet[str]) -> Json:
+    """A lens by name, with its surfaces, in the middle of the widest gap that light meets."""
+    lens = _real_lens(kind)
+    if z is None:
+        z = _length(max(_suitable_place("real_lens", train) - lens.length / 2, 0.0), 6)
+    units.parse(z, "length", "z")
+    alone = Train([lens], replace(train.sensor, z=lens.length, electronics=None))
+    tables, _ = tables_of_train(alone, NOWHERE)
+    return {**tables["elements"][0], "name": free_name(kind, names), "z": z}
+
+
 LENSLET_PIXELS = 8
 """Pixels of the sensor across a new lenslet."""
-FROM_FILES = ("ray_table_lens",)
+FROM_FILES = ("real_lens", "ray_table_lens")
 """Kinds that a bench shows and changes, but cannot add."""
-IN_GAPS = ("lens", "first_order")
+IN_GAPS = ("lens", "first_order", "real_lens")
 BEFORE_SENSOR = ("lens_array", "louvre", "angle_filter")
 
 

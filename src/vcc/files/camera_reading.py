@@ -52,6 +52,8 @@ DEEPEST = 30
 """Maximum nesting of tables and lists in a camera; NumPy arrays have up to 32 axes."""
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number in a camera file: computations on light use float32."""
+LARGEST_TERM = 1e100
+"""Of aspheric terms, which are per metre to powers up to that of r¹⁶ and more: phone lenses have 10⁴⁵."""
 
 _ARRAY_LIKE = set(get_args(ArrayLike))
 
@@ -163,7 +165,7 @@ def train_of_tables(
         raise InputError(as_toml(str(error))) from error.__cause__
 
 
-def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int) -> None:
+def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int, largest: float = LARGEST) -> None:
     """Raise for values that no camera has: numbers that overflow in computation, lists nested too deeply."""
     if not levels:
         raise InputError(
@@ -171,10 +173,11 @@ def _check_values(given: Mapping[str, Any] | list[Any], place: str, levels: int)
         )
     for key, each in enumerate(given, start=1) if isinstance(given, list) else given.items():
         if isinstance(each, dict | list):
-            _check_values(each, f"{place}: {key}" if isinstance(key, str) else f"{place} {key}", levels - 1)
-        elif isinstance(each, int | float) and abs(each) > LARGEST and each not in (math.inf, -math.inf):
             inside = f"{place}: {key}" if isinstance(key, str) else f"{place} {key}"
-            raise InputError(f"{inside} is {in_toml(each)}: a camera's numbers are up to {LARGEST:.3g}")
+            _check_values(each, inside, levels - 1, LARGEST_TERM if key == "aspheres" else largest)
+        elif isinstance(each, int | float) and abs(each) > largest and each not in (math.inf, -math.inf):
+            inside = f"{place}: {key}" if isinstance(key, str) else f"{place} {key}"
+            raise InputError(f"{inside} is {in_toml(each)}: a camera's numbers are up to {largest:.3g}")
 
 
 def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -> Any:
