@@ -4,8 +4,7 @@ With a the direction of a ray and b its place in the plane where the light is na
 axis and in units of their largest length, and u = a·a, v = a·b, w = b·b, symmetry about the axis and its planes
 allows X = a·A(u, v, w) + b·B(u, v, w) and no other form, for the place X behind the lens and for the slope there.
 A and B are polynomials of total degree n, X is one of degree 2n + 1 in the ray. Rays outside the fitted ones are
-dark. Source of the idea: Goossens et al. 2022, Optics Express 30, 24031; of the form: Welford, *Aberrations of
-Optical Systems*, section 7.2.
+dark. Source: Goossens et al. 2022, Optics Express 30, 24031, whose polynomials do not have this form.
 """
 
 from __future__ import annotations
@@ -27,6 +26,8 @@ NEAR = 1 / 8
 """Differences of |a| up to which rays make the opening of a direction."""
 GROWTH = 0.58
 """Exponent of the share that the hull of n rays lacks."""
+LARGEST = 0.1
+"""Largest share of the light by which the opening is made larger than the hull of the rays."""
 FITTED, CHECKED = 2500, 2000
 """Most rays that a map is fitted to and checked on; they are drawn at random from the table."""
 
@@ -61,7 +62,9 @@ class RayMap(Brief):
     @property
     def radius(self) -> float:
         """Of a disc, at ``distance``, that all its light passes, metres."""
-        return 1.01 * self.widest * float(max(self.opening[0].max(), 1.0))
+        away = np.linspace(0, 1, BANDS)
+        shift = np.abs(away * np.polynomial.polynomial.polyval(away**2, self.centre))
+        return self.widest * float((shift + self.opening.max(axis=1)).max())
 
     def sag(self, square: Array) -> tuple[Array, Array]:
         """The disc is flat: zeros for sag and slope, as of a surface."""
@@ -267,8 +270,8 @@ def _opening(a: Array, b: Array) -> tuple[Array, Array, float, float]:
         fewer = _section(mirrored[near & half], at)
         growth[row] = (opening[row] ** 2).sum() / max((fewer**2).sum(), 1e-12) - 1
     growth = np.convolve(np.pad(growth, 2, "edge"), np.full(5, 0.2), "valid")
-    missing = np.clip(growth / (2**GROWTH - 1), 0, 0.1)
-    opening *= 1 + missing[:, None] / 2
+    missing = np.clip(growth / (2**GROWTH - 1), 0, 1)
+    opening *= 1 + np.minimum(missing, LARGEST)[:, None] / 2
     # Places of the opening that are far from every ray: the light is not convex there.
     tree, rng = cKDTree(mirrored), np.random.default_rng(2)
     apart = tree.query(points[rng.permutation(len(points))[:2000]], k=2)[0][:, 1]
