@@ -34,6 +34,7 @@ from vcc.bench.screen import codes
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.files.pictures import auto_exposure
 from vcc.plan.choice import compile_best
+from vcc.prescriptions import built_in_lenses
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def client():
 def test_hello_brings_parts_state_and_picture(client):
     client.do("hello", turn=7)
     parts, _ = client.until("parts")
-    assert {kind["kind"] for kind in parts["kinds"]} == set(ELEMENT_KINDS)
+    assert {kind["kind"] for kind in parts["kinds"]} == {*ELEMENT_KINDS, *built_in_lenses()}
     lens = next(kind for kind in parts["kinds"] if kind["kind"] == "lens")
     focal_length = next(each for each in lens["parameters"] if each["name"] == "focal_length")
     assert (focal_length["unit"], focal_length["needed"]) == ("length", True)
