@@ -352,6 +352,8 @@ def test_runs_from_top_to_bottom(page, names, quick):
                 exec(compile(text, name_of(page), "exec"), names)
             elif language == "sh":
                 run_commands(text, name_of(page))
+            elif text.startswith("views = "):
+                Path("views.toml").write_text(text, encoding="utf-8")
             else:
                 load(text)
                 if "[sensor]" in text:

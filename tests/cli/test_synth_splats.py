@@ -58,6 +58,41 @@ def test_look_lists_cameras_and_draws_them(folder, poses):
         assert ((sheet[..., colour] > 150) & (others < 100)).sum() > 100
 
 
+def test_views_from_a_file_by_an_executor_have_the_same_bytes(folder):
+    (folder / "there").mkdir()
+    (folder / "cameras.json").rename(folder / "there/cameras.json")
+    (folder / "there/views.toml").write_text(
+        'views = [3, 3]\npixels = [30, 40]\ncamera_from = "cameras.json"\nfocus_distance = "2.5 m"\n'
+        'unit = "1 m"\naperture = ["30 mm", "60 mm"]\n'
+    )
+    result = run("synth", "splats", "balls.ply", "there/views.toml", "-o", "a.zarr", "--focus-distance", "3 m")
+    assert result.exit_code == 0, result.output
+    assert "converge at 3 m, 20 mm apart" in result.output
+    options = ("--camera-from", "there/cameras.json", "--focus-distance", "3 m", "--aperture", "30 mm, 60 mm")
+    result = run("synth", "splats", "balls.ply", "-o", "b.zarr", *SMALL, *options, "--executor", "threads")
+    assert result.exit_code == 0, result.output
+    a, b = (open_store(name) for name in ("a.zarr", "b.zarr"))
+    assert a.grid.frame == b.grid.frame
+    assert a.read().values.tobytes() == b.read().values.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("views = [3", "views.toml is not TOML"),
+        ('colour = "red"', "colour does not describe views"),
+        ("views = {}", "views is {}"),
+        ("views = [3, 3]\naperture = 20", "aperture"),
+        ('direction = "0, 0, 1"', "--direction"),
+        ("views = [3, 2.5]", "it is a whole number"),
+    ],
+)
+def test_files_of_views_that_are_none(folder, text, message):
+    (folder / "views.toml").write_text(text)
+    assert message in refused("synth", "splats", "balls.ply", "views.toml", "-o", "a.zarr")
+    assert not (folder / "a.zarr").exists()
+
+
 def test_eye_and_target(folder):
     result = run("synth", "splats", "balls.ply", "-o", "a.zarr", *SMALL, "--eye", "0, 0, 8", "--target", "0, 0, 0",
                  "--aperture", "20 mm", "--focus-distance", "4 m", "--field-of-view", "40 deg")  # fmt: skip
@@ -80,6 +115,9 @@ def test_eye_and_target(folder):
         (("-o", "a.zarr", "--degree", 3), "degree of the harmonics"),
         (("--look", "--degree", 3), "degree of the harmonics"),
         (("--look", "-o", "a.zarr"), ".png"),
+        (("-o", "a.zarr", "--executor", "cluster"), "--executor is processes"),
+        (("-o", "a.zarr", "a.toml", "b.toml"), "one file of views"),
+        (("-o", "a.zarr", "a.toml"), "a.toml"),
     ],
 )
 def test_bad_input(folder, options, message):

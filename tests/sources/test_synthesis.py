@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -98,7 +99,7 @@ def test_a_failure_keeps_what_is_done_and_the_same_call_goes_on(tmp_path, focus)
     with pytest.raises(InputError) as failure:
         synthesize(Numbers(stops_at=(1, 1)), cameras, path, dtype="float32")
     for words in (
-        "view (1, 1), number 5 of 6",
+        "view (1, 1) could not be rendered",
         "RuntimeError: the lamp has burnt out",
         "4 of 6 views are kept in",
         "half done.zarr",
@@ -110,6 +111,27 @@ def test_a_failure_keeps_what_is_done_and_the_same_call_goes_on(tmp_path, focus)
     assert steps == [(4, 6), (5, 6), (6, 6)]
     assert made.complete
     assert np.array_equal(made.read().values[1:, 2], Numbers().render(cameras.camera(1, 2))[None])
+
+
+@pytest.mark.parametrize("store", [None, "threads.zarr"])
+def test_an_executor_renders_the_same_views(tmp_path, store):
+    path, steps = store and tmp_path / store, []
+    if path is not None:  # goes on where one process has stopped
+        with pytest.raises(InputError, match="4 of 6 views are kept"):
+            synthesize(Numbers(stops_at=(1, 1)), CAMERAS, path, dtype="uint8")
+    with ThreadPoolExecutor(2) as pool:
+        made = synthesize(
+            Numbers(), CAMERAS, path, dtype="uint8", executor=pool, progress=lambda *step: steps.append(step)
+        )
+        again = made if path is None else made.read()
+        assert again.values.tobytes() == synthesize(Numbers(), CAMERAS, dtype="uint8").values.tobytes()
+        assert steps == [(n, 6) for n in range(0 if path is None else 4, 7)]
+        with pytest.raises(InputError, match=r"view \(1, 1\) could not be rendered[^$]*Give store="):
+            synthesize(Numbers(stops_at=(1, 1)), CAMERAS, executor=pool)
+        cannot = Numbers()
+        cannot.lamp = lambda: None
+        with pytest.raises(InputError, match="cannot be sent to other processes"):
+            synthesize(cannot, CAMERAS, executor=pool)
 
 
 def test_a_kill_keeps_what_is_done(tmp_path):
@@ -169,7 +191,7 @@ class Wrong(Numbers):
 def test_pictures_that_are_none_are_refused(picture, message):
     with pytest.raises(InputError, match=message) as failure:
         synthesize(Wrong(picture), CAMERAS)
-    assert str(failure.value).startswith("view (0, 0), number 1 of 6")
+    assert str(failure.value).startswith("view (0, 0) ")
     assert "Give store=" in str(failure.value)
 
 

@@ -14,6 +14,7 @@ from cyclopts.exceptions import MissingArgumentError, UnknownCommandError, Unuse
 from vcc import __version__
 from vcc.base.errors import InputError
 from vcc.cli.console import notes, say
+from vcc.cli.synth.views_file import with_views
 
 COMMANDS = {
     "capture": (
@@ -150,6 +151,7 @@ RENDERERS = {
         "vcc synth splats room.ply --look",
         "vcc synth splats room.ply -o room.zarr --camera 3 --parallax 1",
         "vcc synth splats garden.ply -o garden.zarr --camera-from cameras.json --camera 12 --views 9 9",
+        "vcc synth splats garden.ply views.toml -o garden.zarr --executor processes",
     ),
 }
 """Likewise: ``vcc synth NAME`` is the function NAME in ``vcc.cli.synth.NAME``."""
@@ -203,7 +205,9 @@ app.command(
         "vcc.cli.synth",
         RENDERERS,
         "Render a light field of a scene with one of these renderers. Views are written as they are done, and the "
-        "same command resumes an interrupted run.",
+        "same command resumes an interrupted run.\n\n"
+        "A file .toml among the arguments states where the views are: the options of that group by name, as in "
+        'views = [9, 9] and aperture = "20 mm". Options next to it have precedence.',
         "Help on a renderer:  vcc synth planes --help",
         place=len(COMMANDS),
     )
@@ -247,7 +251,7 @@ def run(arguments: Sequence[str]) -> int:
     """
     with notes():
         try:
-            app(list(arguments), exit_on_error=False, print_error=False, result_action="return_value")
+            app(with_views(arguments), exit_on_error=False, print_error=False, result_action="return_value")
         except InputError as error:
             return _refuse(str(error))
         except CycloptsError as error:

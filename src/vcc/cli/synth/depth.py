@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.cli.console import show
 from vcc.cli.options import Counts, Length
-from vcc.cli.synth.rendering import SampleType, Store, Views, check_store, make
+from vcc.cli.synth.rendering import RenderedBy, SampleType, Store, Views, check_store, make
 from vcc.files.images_with_metadata import light_in
 from vcc.files.netpbm import read_pfm
 from vcc.files.pictures import read_picture, refuse_coded
@@ -60,6 +60,7 @@ def depth(
     output: Store,
     where: ViewsOfPicture = ViewsOfPicture(),
     reading: ReadingDepth = ReadingDepth(),
+    by: RenderedBy = RenderedBy(),
     dtype: SampleType = "float16",
 ) -> None:
     """Make the views around a picture from its depth; hidden parts behind edges are filled in.
@@ -87,7 +88,7 @@ def depth(
         middle = 2 / (1 / distances.min() + 1 / distances.max())
         cameras = where.cameras(pixels=pixels, focus_distance=float(middle))
         scene = DepthMapScene.for_cameras(radiance, distances, cameras)
-    make(scene, cameras, output, dtype)
+    make(scene, cameras, output, dtype, by)
     corner = scene.uncovered(cameras.camera(0, 0))
     show(f"{float(corner.mean()):.1%} of the corner view was filled in: behind edges and beyond the border")
 

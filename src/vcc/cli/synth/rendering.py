@@ -14,6 +14,7 @@ from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.units import deg, mm, parse, short
 from vcc.cli.console import progress, show
+from vcc.cli.executing import Executing, Who
 from vcc.cli.options import Counts, Length, Lengths, Whole, quantity
 from vcc.sources import CameraArray, Renderer, synthesize
 
@@ -94,6 +95,23 @@ class ViewsAndPixels(Views):
     pixels: Counts = (500, 500)
 
 
+@Parameter(name="*", group=HOW)
+@dataclass(frozen=True, kw_only=True)
+class RenderedBy(Executing):
+    """The executor that renders the views.
+
+    Args:
+        executor: What renders the views, some in each task: `processes` or `threads`, one per core of this
+            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread. Default:
+            one view after the other, on all cores.
+    """
+
+    executor: Who = None
+
+    def __post_init__(self) -> None:
+        self.check_name()
+
+
 def check_store(path: Path) -> Path:
     """Check that a store can be written at this path, before a scene is loaded.
 
@@ -107,15 +125,17 @@ def check_store(path: Path) -> Path:
     return path
 
 
-def make(renderer: Renderer, cameras: CameraArray, output: Path, dtype: str) -> None:
+def make(
+    renderer: Renderer, cameras: CameraArray, output: Path, dtype: str, by: RenderedBy = RenderedBy()
+) -> None:
     """Render all views into a store, with a progress bar, and print a summary.
 
     Raises:
         InputError: see `synthesize`.
     """
     try:
-        with progress("Rendering views") as advance:
-            made = synthesize(renderer, cameras, output, dtype=dtype, progress=advance)
+        with by.opened() as executor, progress("Rendering views") as advance:
+            made = synthesize(renderer, cameras, output, dtype=dtype, executor=executor, progress=advance)
     finally:
         close = getattr(renderer, "close", None)
         if close is not None:

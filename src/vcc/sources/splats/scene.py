@@ -83,7 +83,7 @@ class SplatScene:
         self.splats = cloud if degree is None else cloud.of_degree(degree)
         self.background = check_light("background", background)
         self.near = checks.above_zero("near", near, "a distance in scene units")
-        self.threads = cores() if threads is None else checks.whole_number_between("threads", threads, 1)
+        self.threads = None if threads is None else checks.whole_number_between("threads", threads, 1)
         self.low_pass = ("mip" if cloud.antialiased else "3dgs") if low_pass == "auto" else low_pass
         self.transfer = cloud.transfer if transfer == "auto" else transfer
         if viewpoint is None:
@@ -161,7 +161,7 @@ class SplatScene:
         behind = np.asarray(from_linear(self.background) if display else self.background, np.float32)
         image = np.empty((rows, columns, 4), np.float32)
         depths = np.empty((rows, columns) if with_depth else (0, 0), np.float32)
-        with Workers(self.threads) as workers:
+        with Workers(self.threads or cores()) as workers:
 
             def shared(work: Any, total: int, step: int) -> None:
                 parts = [workers.submit(work, first, min(first + step, total)) for first in range(0, total, step)]
