@@ -626,13 +626,14 @@ class Camera(Train):
         """Draw the axis, the elements, the sensor and fans of rays. See `vcc.plot.plot_camera`."""
         return plot_camera(self, **options)
 
-    def bench(self, light_field: InMemory) -> Any:
+    def bench(self, light_field: Any) -> Any:
         """Open this camera on the optical bench, in a notebook: move its elements and see the image change.
 
         The widget's ``camera`` is the current camera on the bench; this camera is not changed.
 
         Args:
-            light_field: at the entrance plane, in memory.
+            light_field: at the entrance plane, in memory; or a `vcc.sources.splats.SplatScene`, which is rendered
+                in few coarse views at first, and then in 9×9 views of 320 pixels along the longer side.
 
         Returns:
             A widget; show it as the last line of a cell (Jupyter, VS Code, marimo).

@@ -15,6 +15,7 @@ from vcc.base.progress import Progress
 from vcc.bench import messages
 from vcc.bench.document import Document
 from vcc.bench.editing import Editing
+from vcc.bench.offered import Field
 from vcc.bench.pace import MOST_KINDS, Pace
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken, out_of_focus, take
 from vcc.bench.side import scene_distances
@@ -59,7 +60,7 @@ class Imaging:
         self._pace = Pace()
         self._parts: dict[Fineness, Parts] = {}
         self._rehearsals: dict[Hashable, list[tuple[bool, Fineness]]] = {}
-        self._of: Document | None = None
+        self._of: tuple[Document, Field] | None = None
         self.taken: Taken | None = None
 
     # --- the image of the document ---
@@ -103,9 +104,13 @@ class Imaging:
             raise InputError("there is no image yet")
         return self.taken
 
-    def _lit(self) -> Document:
-        """The document without what changes only how its image is shown."""
-        return replace(self._editing.document, exposure=None)
+    def _lit(self) -> tuple[Document, Field]:
+        """The document without what changes only how its image is shown, and its light field."""
+        return replace(self._editing.document, exposure=None), self._field
+
+    @property
+    def _field(self) -> Field:
+        return self._editing.offered.field(self._editing.document.light_field)
 
     def none(self) -> None:
         """There is no image any more."""
@@ -159,7 +164,17 @@ class Imaging:
         sharp = not scene or (focus is not None and min(scene) <= focus <= max(scene))
         sensor = described.train.sensor
         kinds = (element.kind for element in described.elements)
-        return document.light_field, document.views, sensor.shape, sensor.photodiodes, sharp, *kinds
+        return self._field, document.views, sensor.shape, sensor.photodiodes, sharp, *kinds
+
+    @property
+    def shown(self) -> Field | None:
+        """The light field from which the newest image was made."""
+        return None if self._of is None else self._of[1]
+
+    def is_best(self) -> bool:
+        """Whether the whole image is shown, made from the best light field; also if there is no whole image."""
+        whole = self.taken is not None and not self.taken.coarse
+        return not whole or (self.shown is self._field and self._field.better is None)
 
     def is_rehearsed(self) -> bool:
         """Whether nothing is left to rehearse, or rehearsing is useless because no whole image is shown."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.bench.document import Document, shown
 from vcc.fields.sampled import to_numpy
 from vcc.files.camera_reading import Beside
@@ -32,10 +32,11 @@ class Field:
     Args:
         light_field: the light field, or a function that opens it.
         source: Python code with which a program opens it; empty if there is none.
+        better: the same with more views or pixels, to be opened after this one and shown in its place.
     """
 
-    def __init__(self, light_field: LightField | Opened, source: str = "") -> None:
-        self.source = source
+    def __init__(self, light_field: LightField | Opened, source: str = "", better: Field | None = None) -> None:
+        self.source, self.better = source, better
         self._opened = light_field
         self._by_step: dict[int, LightField] = {}
         self._lock = threading.Lock()
@@ -69,7 +70,9 @@ class Field:
         found = self._by_step.get(step)
         if found is not None:
             return found  # without waiting for the lock
-        with self._lock:
+        while not self._lock.acquire(timeout=LONG):  # another client opens it
+            tell(progress, 0, 1)
+        try:
             if 1 not in self._by_step:
                 opened = self._opened
                 self._by_step[1] = opened if isinstance(opened, LightField) else opened(progress)
@@ -77,6 +80,8 @@ class Field:
                 if coarser not in self._by_step:
                     self._by_step[coarser] = _halved(self._by_step[coarser // 2])
             return self._by_step[step]
+        finally:
+            self._lock.release()
 
 
 class Turn:
@@ -145,7 +150,7 @@ class Offered:
         turn: the lock to hold while making an image.
     """
 
-    fields: Mapping[str, Field]
+    fields: MutableMapping[str, Field]
     start: Document
     beside: Beside
     gallery: Mapping[str, Document] = field(default_factory=dict)
@@ -161,6 +166,31 @@ class Offered:
         if name not in self.fields:
             raise InputError(f"there is no light field {shown(name)}: there are {', '.join(self.fields)}")
         return self.fields[name]
+
+    def improve(self, name: str, progress: Progress | None = None) -> bool:
+        """Open the better light field that follows the one of a name, and put it in its place.
+
+        Args:
+            name: of the light field.
+            progress: called while the better one is opened; an exception that it raises ends the work.
+
+        Returns:
+            Whether there is a better one.
+
+        Raises:
+            InputError: there is no such light field, or the better one cannot be opened.
+        """
+        before = self.field(name)
+        if before.better is None:
+            return False
+        try:
+            before.better.whole(progress)
+        except (InputError, MemoryError):
+            before.better = None
+            raise
+        if self.fields[name] is before:
+            self.fields[name] = before.better
+        return True
 
 
 def _halved(light_field: LightField) -> LightField:

@@ -73,6 +73,7 @@ class Session:
         self._changed = threading.Condition()
         self._closed = False
         self._wanted: Wanted | None = None
+        self._turn = 0
         self._look = screen.PLAIN
         self._white = 1.0
         self._drawn: tuple[Document, Hashable, Side] | None = None
@@ -151,6 +152,8 @@ class Session:
                     self._answer(message, buffers)
                 elif self._wanted is not None:
                     self._make_picture()
+                elif not self._imaging.is_best():
+                    self._improve()
                 else:
                     self._imaging.rehearse()
             except Superseded:
@@ -163,7 +166,7 @@ class Session:
     def _is_idle(self) -> bool:
         """Wait a moment for work; return whether there is none, and nothing to rehearse."""
         return not self._changed.wait_for(self._has_to_do, PAUSE) and (
-            self._send is None or self._imaging.is_rehearsed()
+            self._send is None or (self._imaging.is_best() and self._imaging.is_rehearsed())
         )
 
     def _has_to_do(self) -> bool:
@@ -319,7 +322,7 @@ class Session:
         """The side view of the document; drawn again if it has changed."""
         document, train, axis = self.document, self._editing.train, self._look.axis
         field = self.offered.field(document.light_field)
-        of = field.is_open, axis, moving
+        of = field, field.is_open, axis, moving
         if self._drawn is None or self._drawn[0] is not document or self._drawn[1] != of:
             seen, aperture = None, None
             if field.is_open:
@@ -336,9 +339,35 @@ class Session:
         if self._closed:
             raise Superseded
 
+    def _improve(self) -> None:
+        """Put better light fields in the place of a coarse one, and show the image that they make."""
+
+        def progress(done: int, total: int) -> None:
+            self._tell("progress", {"done": done, "total": total, "words": "Rendering more and finer views"})
+            self._check_wanted()
+
+        document, shown = self.document, self._imaging.shown
+        try:
+            while self.offered.improve(document.light_field, progress):
+                pass
+        except (InputError, MemoryError) as error:
+            told = {"do": "load", "words": str(_in_words(error)), "where": None, "turn": self._turn}
+            self._tell("refused", told)
+        now = self.offered.field(document.light_field)
+        if document.views is not None and shown is not None and shown.whole().shape[:2] != now.whole().shape[:2]:
+            self._editing.put(replace(document, views=None))  # they were counted among fewer views
+        self._tell_state(self._turn)
+        self._wanted = Wanted(self._turn, moving=False, coarse_shown=True)
+
+    def _finish(self) -> None:
+        """Put better light fields in the place of a coarse one, before a result that lasts."""
+        if self.offered.field(self.document.light_field).better is not None:
+            self._improve()
+
     def _make_picture(self) -> None:
         wanted = self._wanted
         assert wanted is not None
+        self._turn = wanted.turn
         field = self.offered.field(self.document.light_field)
         try:
             if not field.is_open:
@@ -401,6 +430,7 @@ class Session:
             self._tell_picture(self._imaging.taken, Wanted(turn_of(message), moving=False))
 
     def _do_pin(self, _: Json) -> None:
+        self._finish()
         self._pins.add(self.document, self._imaging.whole().values, self._white)
         self._tell_pins()
 
@@ -444,6 +474,8 @@ class Session:
         what, train = message.get("what"), self._editing.train
         found: Mapping[str, Any]
         buffers: Sequence[bytes] = []
+        if what in (*decoded.QUESTIONS, "scrub"):
+            self._finish()
         if what in decoded.QUESTIONS:
             found, buffers = self._decoding.answer(message, self._asked())
         elif what == "profile":
@@ -460,7 +492,13 @@ class Session:
         return decoded.Asked(
             train,
             self._editing.light_field(),
-            (train, document.light_field, document.views, document.aperture, document.wavelengths),
+            (
+                train,
+                self.offered.field(document.light_field),
+                document.views,
+                document.aperture,
+                document.wavelengths,
+            ),
             document.noise,
             self._imaging.whole,
             self._imaging.all_cores,
@@ -473,6 +511,8 @@ class Session:
         return {"values": list(sweep.values), "label": sweep.label}, pictures
 
     def _do_export(self, message: Json) -> None:
+        if message.get("what") != "toml":
+            self._finish()
         document, what = self.document, message.get("what")
         if what == "film":
             sweep = sweep_of(message, document)

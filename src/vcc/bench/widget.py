@@ -14,38 +14,43 @@ from vcc.bench.document import Document
 from vcc.bench.inbox import Broken
 from vcc.bench.offered import Field, Offered
 from vcc.bench.session import Session
+from vcc.bench.splat_views import SplatViews
 from vcc.camera import Camera
 from vcc.fields.samples import check_is_light_field
 from vcc.files.camera_reading import Beside
 from vcc.files.camera_writing import NOWHERE, tables_of_train
 from vcc.light_field import LightField
 from vcc.optics.train import Train
+from vcc.sources.splats import SplatScene
 
 NAME = "light field"
 """Name of a notebook's light field on a bench."""
 
 
-def bench_of(camera: Train, light_field: LightField) -> Any:
+def bench_of(camera: Train, light_field: LightField | SplatScene) -> Any:
     """A camera on the bench, as a widget; see `vcc.Camera.bench`."""
-    check_is_light_field(light_field)
-    if not isinstance(light_field, LightField):
+    if not isinstance(light_field, SplatScene):
+        check_is_light_field(light_field)
+    if not isinstance(light_field, LightField | SplatScene):
         raise InputError(
             "the bench needs a light field in memory: pass stored.read(), or a part, stored[a:b, c:d]"
         )
     return _kind()(_offered(camera, light_field))
 
 
-def _offered(camera: Train, light_field: LightField) -> Offered:
+def _offered(camera: Train, light_field: LightField | SplatScene) -> Offered:
     tables, arrays = tables_of_train(camera, NOWHERE / "camera.toml")
     document = Document({"elements": [], **tables}, NAME)
-    return Offered({NAME: _field(light_field)}, document, Beside(NOWHERE, frozenset(), arrays))
+    return Offered({NAME: _field(light_field, camera)}, document, Beside(NOWHERE, frozenset(), arrays))
 
 
 _fields: WeakValueDictionary[int, Field] = WeakValueDictionary()
 
 
-def _field(light_field: LightField) -> Field:
+def _field(light_field: LightField | SplatScene, camera: Train) -> Field:
     """The `Field` of a light field, reused with its coarser copies if a cell runs again."""
+    if isinstance(light_field, SplatScene):
+        return SplatViews.before(camera, light_field).field()
     found = _fields.get(id(light_field))  # a Field keeps its light field alive, so the id stays unique
     if found is None:
         found = _fields[id(light_field)] = Field(light_field)

@@ -63,6 +63,7 @@ COMMANDS = {
         "vcc bench",
         "vcc bench --gallery plenoptic",
         "vcc bench camera.toml views/",
+        "vcc bench room.ply",
     ),
     "demo": (
         "Run the paper's examples and its own check, and explain them on a page of pictures.\n\n"

@@ -7,19 +7,26 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from vcc.base import units
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
+from vcc.base.units import short
 from vcc.bench.cameras import SCENE, cameras, scenes
 from vcc.bench.document import Document
 from vcc.bench.offered import Field, Offered
 from vcc.bench.published import Gallery, title_of
 from vcc.bench.server import LOOPBACK, run
+from vcc.bench.splat_views import SplatViews
 from vcc.bench.starting import presets
 from vcc.camera_file import load_camera
 from vcc.cli.console import show
-from vcc.cli.options import Reading, Whole
+from vcc.cli.options import Reading, Whole, given_options
+from vcc.cli.synth.splats import Standing
 from vcc.files.camera_reading import Beside, read_tables, train_of_tables
 from vcc.light_field import LightField
+from vcc.optics.train import Train
+from vcc.sources.splats import SplatScene, read_splats
+from vcc.sources.splats.reading import SPLAT_ENDINGS
 from vcc.store import is_store
 
 
@@ -35,8 +42,12 @@ def bench(
     no_browser: bool = False,
     gallery: Annotated[str | None, Parameter(metavar="NAME")] = None,
     reading: Reading = Reading(),
+    standing: Standing = Standing(),
 ) -> None:
     """Open the optical bench in the browser: move elements and see the image change.
+
+    A scene of Gaussian splats (.ply, .splat, .spz, .glb) is rendered in few coarse views at first, and then in 9×9
+    views of 320 pixels along the longer side. Without a camera, the lens focuses in the middle of its depth.
 
     Args:
         host: The address to listen on. With any other than this machine's own, other machines can connect;
@@ -47,11 +58,15 @@ def bench(
     """
     fields = scenes()
     name = SCENE
+    if camera is not None and light_field is None and camera.suffix.lower() in SPLAT_ENDINGS:
+        camera, light_field = None, camera
     if light_field is not None:
         if not light_field.expanduser().exists():
             raise InputError(f"there is no light field {light_field}")
         name = light_field.expanduser().resolve().name or str(light_field)
-        fields = {name: _field(light_field, reading), **fields}
+    of_splats = light_field is not None and light_field.suffix.lower() in SPLAT_ENDINGS
+    if not of_splats and (wrong := given_options(standing)):
+        raise InputError(f"{', '.join(wrong)}: for a scene of Gaussian splats, {', '.join(SPLAT_ENDINGS)}")
     shown = Gallery(cameras(SCENE), SCENE)
     if camera is None:
         first = next(iter(shown)) if gallery is None else title_of(gallery)
@@ -60,6 +75,14 @@ def bench(
         raise InputError("give a camera file or --gallery NAME, not both")
     else:
         start, beside = _document(camera, name)
+    if light_field is not None and of_splats:
+        field, focus = _splats(light_field, standing, start.train(beside).train)
+        fields = {name: field, **fields}
+        if camera is None and gallery is None:
+            sensor = {**start.camera["sensor"], "focus": units.text(focus, "length")}
+            start = dataclasses.replace(start, camera={**start.camera, "sensor": sensor}).settled(beside)
+    elif light_field is not None:
+        fields = {name: _field(light_field, reading), **fields}
     offered = Offered(fields, start, beside, shown, presets(shown))
     # Opens while the browser starts; a client that is faster waits for the same lock.
     threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
@@ -85,6 +108,15 @@ def _field(path: Path, reading: Reading) -> Field:
     if is_store(path):
         return Field(opened, f"light_field = vcc.store.open_store({place}).read()")
     return Field(opened, f"light_field = vcc.open_light_field({place}{named})")
+
+
+def _splats(path: Path, standing: Standing, train: Train) -> tuple[Field, float]:
+    """The views of a scene of splats for a camera, and the distance at which they converge, metres."""
+    cloud = read_splats(path)
+    viewpoint, _ = standing.viewpoint(cloud)
+    views = SplatViews.before(train, SplatScene(cloud, viewpoint))
+    show(f"views converge at {short(views.focus_distance, digits=3)}")
+    return views.field(str(path.expanduser().resolve())), float(f"{views.focus_distance:.4g}")
 
 
 def _opened(field: Field) -> None:
