@@ -16,11 +16,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.command_line import refused, run
 from vcc.base.errors import InputError, ResultWarning
 from vcc.cli.info import describe
 from vcc.files import transfer
 from vcc.formats import open_light_field, open_unstructured
 from vcc.formats.lens_models import MODELS, LensModel
+from vcc.store import open_store
 
 Array = NDArray[np.float64]
 
@@ -399,3 +401,43 @@ def test_damaged_and_hostile_poses(tmp_path: Path, grid_of_shots: list[Shot]) ->
         open_unstructured(folder, metres_per_unit=0)
     with pytest.raises(InputError, match="no photographs with poses"):
         open_unstructured(tmp_path)
+
+
+def test_the_command_makes_a_store(tmp_path: Path, grid_of_shots: list[Shot]) -> None:
+    project = as_colmap(tmp_path / "colmap", grid_of_shots, True)
+    output = tmp_path / "field.zarr"
+    asked = ("--views", 2, 3, "--pixels", HEIGHT // 2, WIDTH // 2, "--distances", "1.5 m, 2.6 m")
+    done = run("convert", project, output, *asked, "--dtype", "float32")
+    assert done.exit_code == 0, done.output
+    assert re.search(r"of all pixels no photograph shows.*taken as 1 m: pass --unit", done.stderr)
+    stored, options = open_store(output), {"pixels": (HEIGHT // 2, WIDTH // 2), "distances": (1.5, 2.6)}
+    with pytest.warns(ResultWarning):
+        made = open_unstructured(project).on_grid((2, 3), **options)
+    assert stored.read().values.tobytes() == made.values.tobytes()
+    assert stored.grid.frame == made.frame
+    assert stored.grid.filling == made.filling
+    assert stored.provenance["assumed"] == ["metres_per_unit"]
+    # a unit of half a metre halves lengths, and leaves slopes
+    done = run("convert", project, tmp_path / "half.zarr", *asked[:-1], "0.75 m, 1.3 m", "--unit", "50 cm")
+    assert done.exit_code == 0, done.output
+    assert "taken as 1 m" not in done.stderr
+    halved = np.diag(open_store(tmp_path / "half.zarr").grid.frame.linear) / np.diag(made.frame.linear)
+    assert halved == pytest.approx([0.5, 0.5, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--slope-per-pixel", "0.01"), "which state their cameras: leave out --slope-per-pixel"),
+        (("--distances", "1 m"), "--distances is one length"),
+        (("--off-plane", "1e-9"), "or accept the error: pass a larger --off-plane …"),
+        (("--images", "none"), "there is no such file in none"),
+    ],
+)
+def test_the_command_refuses(
+    tmp_path: Path, grid_of_shots: list[Shot], options: tuple[str, ...], words: str
+) -> None:
+    project, output = as_colmap(tmp_path / "colmap", grid_of_shots[:5], True), tmp_path / "field.zarr"
+    assert words in refused("convert", project, output, *options)
+    assert not output.exists()
+    assert "--unit: for photographs with poses" in refused("convert", project / "images", output, "--unit", "1 m")

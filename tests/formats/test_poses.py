@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vcc import InputError
+from vcc.formats import open_unstructured
 from vcc.formats.poses import read_poses
 
 TURN = np.array([[0, 0, 1], [0, -1, 0], [1, 0, 0]])  # right +z, down −y, forward +x: the up direction is +y
@@ -48,7 +49,8 @@ def test_frames_can_have_their_own_focal_length(tmp_path):
         ("{", "not JSON"),
         ("[]", "has no cameras"),
         ("[1]", "neither a list of cameras"),
-        (json.dumps({"frames": [{}]}), "camera 0: transform_matrix is not 4×4 finite numbers"),
+        (json.dumps({"frames": [{}]}), "frame 0: transform_matrix is not 4×4 finite numbers"),
+        (json.dumps({"frames": [1]}), 'no list "frames"'),
         (json.dumps(transforms(fl_x=0)), "its width and focal length are pixels, not 800 and 0"),
         (json.dumps(transforms(fl_x=None)), "neither w and fl_x nor a camera_angle_x"),
         (json.dumps(CAMERAS).replace("[1, 2, 3]", "[1, 2, NaN]"), "camera a: position is not 3 finite numbers"),
@@ -60,6 +62,38 @@ def test_other_files_raise(tmp_path, text, message):
     (tmp_path / "a.json").write_text(text)
     with pytest.raises(InputError, match=message):
         read_poses(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (np.diag([0.25, 0.25, 0.25, 1]), None),  # some programs scale poses
+        (np.diag([1, 1.0009, 1, 1]), None),  # few digits
+        (np.diag([1, 1.01, 1, 1]), "mirrored, stretched or skewed"),
+        (np.diag([-1, 1, 1, 1]), "mirrored, stretched or skewed"),
+        (np.diag([0, 0, 0, 1]), "mirrored, stretched or skewed"),
+        (np.diag([1, 1, np.inf, 1]), "not 4×4 finite numbers"),
+    ],
+)
+def test_both_readers_accept_the_same_matrices(tmp_path, change, message):
+    tree = transforms()
+    for number, frame in enumerate(tree["frames"]):
+        with np.errstate(invalid="ignore"):
+            matrix = np.nan_to_num(np.array(frame["transform_matrix"]) @ change, posinf=np.inf, neginf=-np.inf)
+        tree["frames"][number] = frame | {"transform_matrix": matrix.tolist()}
+    (tmp_path / "transforms.json").write_text(json.dumps(tree))
+    (tmp_path / "images").mkdir()
+    (tmp_path / "images/a.jpg").write_bytes(b"not read")
+    if message is None:
+        (camera, _), views = read_poses(tmp_path / "transforms.json"), open_unstructured(tmp_path)
+        photograph = views.photographs.photographs[0]
+        assert camera.eye == tuple(photograph.centre) == (1, 2, 3)
+        assert camera.forward == pytest.approx((1, 0, 0))
+        assert photograph.rotation == pytest.approx(TURN.T, abs=1e-3)
+    else:
+        for read in (read_poses, open_unstructured):
+            with pytest.raises(InputError, match=f"frame 0.* {message}"):
+                read(tmp_path / "transforms.json")
 
 
 def test_colmap(tmp_path):

@@ -79,6 +79,7 @@ COMMANDS = {
         "vcc convert views/ small.zarr --lossy jpegxl --quality 90",
         "vcc convert scene.zarr half.zarr --dtype float16",
         "vcc convert scene.zarr flight.mp4",
+        'vcc convert my_photographs/ field.zarr --unit "10 cm" --distances "1.4 m, 3 m"',
         'vcc convert take/ video.zarr --frame-rate 24 --spacing "1 mm"',
     ),
     "decode": (

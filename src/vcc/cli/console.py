@@ -20,7 +20,7 @@ Part = TypeVar("Part")
 _LIBRARY_OPTION = re.compile(
     r"\b(transfer|spacing|slope_per_pixel|focus_distance|orientation|scene_distance|interpolation"
     r"|between_views|memory_limit|engine|exposure|radiance|seed|method|samples|tolerance|refine|threads"
-    r"|views|order|every|layout|kind|executor)=(?=(\S?))"
+    r"|views|order|every|layout|kind|executor|images|pixels|off_plane)=(?=(\S?))"
 )
 _PAIR = re.compile(r"\bviews=\((\w+), (\w+)\)")
 
@@ -60,7 +60,8 @@ def as_options(message: str) -> str:
     """
     message = message.replace("(lengths in metres)", '(lengths with a unit: "50 mm")')
     message = message.replace("focus_distance=… (metres)", 'focus_distance=… (a length: "1.2 m")')
-    message = message.replace("files_outside=True", "--files-outside")
+    message = message.replace("files_outside=True", "--files-outside").replace("metres_per_unit=…", "--unit …")
+    message = message.replace("distances=(nearest, farthest) in metres", '--distances "NEAREST, FARTHEST"')
     message = _PAIR.sub(r"views=\1 \2", message)
 
     def option(match: re.Match[str]) -> str:

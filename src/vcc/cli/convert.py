@@ -20,7 +20,10 @@ from vcc.base.words import first_few
 from vcc.cli.console import free_output, progress, show
 from vcc.cli.options import (
     Arrangement,
+    Counts,
     FileKind,
+    Length,
+    Lengths,
     LightFieldFile,
     OutputFile,
     Overwrite,
@@ -33,7 +36,8 @@ from vcc.cli.options import (
     quantity,
 )
 from vcc.cli.store_words import video_written, written
-from vcc.formats import read_geometry
+from vcc.formats import open_unstructured, read_geometry
+from vcc.formats.unstructured import recognised as has_poses
 from vcc.formats.writing import kind_of, save_light_field
 from vcc.light_field import LightField
 from vcc.store import Lossless, Lossy, StoredLightField, create_video, is_store, is_video, open_video
@@ -80,6 +84,56 @@ class Storing:
         return Lossless(self.compression or "zstd", 3 if self.level is None else self.level)
 
 
+@Parameter(name="*", group=Group("Photographs with poses", sort_key=4))
+@dataclass(frozen=True, kw_only=True)
+class Posing:
+    """The grid onto which photographs with poses are resampled, with --views and --spacing.
+
+    Args:
+        unit: Length of a unit of the poses, "10 cm", which COLMAP does not state. Default: 1 m, with a note.
+        distances: Of the nearest and the farthest object from the cameras, "1.4 m, 3 m". Default: by the points of
+            the scene in the file.
+        pixels: Rows and columns of a view's pixels. Default: those of the photographs.
+        images: Folder of the photographs. Default: images of the project, or the folder of transforms.json.
+        off_plane: Largest error at the borders of views by cameras that are off their plane, pixels. Default: 1.
+    """
+
+    unit: Length | None = None
+    distances: Lengths | None = None
+    pixels: Counts | None = None
+    images: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
+    off_plane: Annotated[float | None, quantity("NUMBER", above_zero)] = None
+
+    def on_grid(self, path: Path, reading: Reading) -> LightField:
+        """The photographs at a path as a light field; their share of missing pixels is a warning.
+
+        Raises:
+            InputError: options that do not apply; see also `vcc.formats.open_unstructured` and its ``on_grid``.
+        """
+        ours = ("views", "spacing", "focus_distance", "files_outside")
+        if wrong := given_options(reading, but=ours):
+            raise InputError(
+                f"{path} is photographs with poses, which state their cameras: leave out {', '.join(wrong)}"
+            )
+        if self.distances is not None and not isinstance(self.distances, tuple):
+            raise InputError(
+                '--distances is one length: write those of the nearest and the farthest object, "1 m, 3 m"'
+            )
+        photographs = open_unstructured(
+            path, images=self.images, metres_per_unit=self.unit, files_outside=reading.files_outside
+        )
+        asked = {
+            "distances": self.distances,
+            "pixels": self.pixels,
+            "off_plane": self.off_plane,
+            **{name: getattr(reading, name) for name in ours[:3]},
+        }
+        with progress("Rendering views") as advance:
+            return photographs.on_grid(
+                **{name: value for name, value in asked.items() if value is not None}, progress=advance
+            )
+
+
 def convert(
     light_field: LightFieldFile,
     output: OutputFile,
@@ -91,8 +145,11 @@ def convert(
     frame_rate: Annotated[float | None, quantity("NUMBER", above_zero)] = None,
     storing: Storing = Storing(),
     reading: Reading = Reading(),
+    posing: Posing = Posing(),
 ) -> None:
     """Convert a light field to a store (Zarr), or to files of another format.
+
+    Photographs with poses (COLMAP, transforms.json) are resampled onto a grid of views.
 
     Args:
         frame_rate: Frames per second: make a video from LIGHT_FIELD, a folder with one light field per frame
@@ -101,6 +158,9 @@ def convert(
     Raises:
         InputError: the output exists, or reading or writing fails.
     """
+    posed = frame_rate is None and has_poses(expanded(light_field)) is not None
+    if not posed and (wrong := given_options(posing)):
+        raise InputError(f"{', '.join(wrong)}: for photographs with poses (COLMAP, transforms.json)")
     if frame_rate is not None:
         if output.suffix.lower() != ".zarr" or kind or overwrite:
             raise InputError(
@@ -115,7 +175,8 @@ def convert(
         exposed(exposure, "zarr")
         packing = storing.packing()
         output = free_output(output, overwrite)
-        show(_to_store(light_field, output, storing, packing, overwrite, reading))
+        source = _posed(light_field, posing, reading) if posed else _with_its_codes(light_field, reading)
+        show(_to_store(light_field, source, output, storing, packing, overwrite))
     else:
         if wrong := given_options(storing):
             raise InputError(
@@ -123,23 +184,27 @@ def convert(
             )
         output = free_output(output, overwrite)
         options = exposed(exposure, kind_of(output, kind))
-        field = reading.light_field(light_field)
+        field = posing.on_grid(light_field, reading) if posed else reading.light_field(light_field)
         with progress("Writing views") as advance:
             show(save_light_field(field, output, kind=kind, progress=advance, **options).description)
 
 
+Codes = tuple[LightField | StoredLightField, Literal["srgb", "linear"], list[str] | None]
+"""A light field, the encoding of its samples, its assumed parameters (None for stores, which record them)."""
+
+
 def _to_store(
-    source: Path, output: Path, storing: Storing, packing: Lossless | Lossy, overwrite: bool, reading: Reading
+    path: Path, source: Codes, output: Path, storing: Storing, packing: Lossless | Lossy, overwrite: bool
 ) -> str:
-    """Convert a light field to a store; return a summary as text."""
-    field, transfer, assumed = _with_its_codes(source, reading)
+    """Convert a light field from a path to a store; return a summary as text."""
+    field, transfer, assumed = source
     with progress("Writing views") as advance:
         made = convert_to_store(
             field,
             output,
             transfer=transfer,
             dtype=storing.dtype,
-            provenance=None if assumed is None else _provenance(source, assumed),
+            provenance=None if assumed is None else _provenance(path, assumed),
             chunks=storing.chunks,
             compression=packing,
             overwrite=overwrite,
@@ -191,13 +256,13 @@ def _frames_of(output: Path, made: dict[str, Any]) -> int:
     return len(there)
 
 
-def _with_its_codes(
-    source: Path, reading: Reading
-) -> tuple[LightField | StoredLightField, Literal["srgb", "linear"], list[str] | None]:
-    """A light field with samples as stored in the files, their encoding, and the assumed parameters.
+def _posed(source: Path, posing: Posing, reading: Reading) -> Codes:
+    """Photographs with poses on a grid, in linear light."""
+    return posing.on_grid(source, reading), "linear", [] if posing.unit else ["metres_per_unit"]
 
-    For a store, which records its origin, the last is None.
-    """
+
+def _with_its_codes(source: Path, reading: Reading) -> Codes:
+    """A light field with samples as stored in the files, their encoding, and the assumed parameters."""
     if is_store(source):
         return reading.light_field(source), "linear", None
     facts = read_geometry(source, sparse=reading.missing != "refuse", **reading.given(Arrangement))

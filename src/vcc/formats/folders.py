@@ -142,9 +142,8 @@ def _refuse_poses(folder: Path) -> None:
     if unstructured.recognised(folder) is not None:
         raise InputError(
             f"{folder} holds photographs with poses, which are on no grid yet: "
-            f'vcc.formats.open_unstructured("{folder}").on_grid() makes a light field of them (vcc info shows '
-            "how far "
-            "the cameras are from a grid)"
+            f'vcc.formats.open_unstructured("{folder}").on_grid() makes a light field of them, and vcc convert a '
+            "store (vcc info shows how far the cameras are from a grid)"
         )
 
 

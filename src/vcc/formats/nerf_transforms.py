@@ -8,10 +8,12 @@ stated once for all frames, or by each frame: ``fl_x``, ``fl_y``, ``cx``, ``cy``
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json
@@ -21,7 +23,9 @@ from vcc.formats.lens_models import LensModel
 from vcc.formats.photographs import Photograph, Photographs, picture_file
 
 NAME = "transforms.json"
-_ROTATED = 1e-3  # largest entry of R·Rᵀ − 1: matrices are written with few digits
+_ROTATED = 2e-3
+"""Largest entry of RᵀR/size² − 1, as matrices are written with few digits. A size other than 1 is accepted: some
+programs scale poses."""
 _MODELS = {"OPENCV": "FULL_OPENCV", "OPENCV_FISHEYE": "OPENCV_FISHEYE", "PINHOLE": "FULL_OPENCV"}
 
 
@@ -37,31 +41,74 @@ def read(path: Path, pictures: Path | None = None, *, files_outside: bool = Fals
         InputError: not such a file, a camera model that is not supported, a matrix that is not a pose, a picture
             that is missing or outside its folder.
     """
-    stated = read_json(read_bytes(path, "file of poses"), str(path))
-    frames, found = stated.get("frames"), []
-    if not isinstance(frames, list) or not all(isinstance(frame, dict) for frame in frames):
-        raise InputError(f'{path} has no list "frames" of photographs with poses')
-    folder = path.parent if pictures is None else pictures
-    for number, frame in enumerate(frames):
-        where = f"{path}: frame {number}"
-        name = frame.get("file_path")
+    folder, found = path.parent if pictures is None else pictures, []
+    for where, stated, rotation, centre in frames(read_json(read_bytes(path, "file of poses"), str(path)), path):
+        name = stated.get("file_path")
         if not isinstance(name, str):
             raise InputError(f"{where} does not state a file_path")
         if Path(name).suffix.lower() not in PICTURE_ENDINGS:
             name += ".png"  # Blender's scenes of NeRF have names without an ending
         file = picture_file(folder, name, where, files_outside)
-        try:
-            matrix = np.array(frame.get("transform_matrix"), float)
-        except (TypeError, ValueError):
-            matrix = np.zeros(0)
-        if matrix.shape not in ((3, 4), (4, 4)) or not np.isfinite(matrix).all():
-            raise InputError(f"{where} does not state a transform_matrix of 4×4 finite numbers")
-        axes = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
-        if np.abs(axes @ axes.T - np.eye(3)).max() > _ROTATED or np.linalg.det(axes) < 0:
-            raise InputError(f"{where}: its transform_matrix is not a rotation and a translation")
-        rotation = (axes * [1, -1, -1]).T  # from the world to x right, y down, z into the scene
-        found.append(Photograph(file, _lens({**stated, **frame}, file, where), rotation, matrix[:3, 3]))
+        found.append(Photograph(file, _lens(stated, file, where), rotation, centre))
     return Photographs(NAME, path, tuple(found))
+
+
+def frames(
+    tree: dict[str, Any], path: Path
+) -> Iterator[tuple[str, dict[str, Any], NDArray[np.float64], NDArray[np.float64]]]:
+    """The frames of a ``transforms.json``, without their pictures.
+
+    Args:
+        tree: the content of the file.
+        path: the file, for messages.
+
+    Yields:
+        The name of the frame for messages; all that is stated for it, or for all frames; the rotation from the
+        world to the camera (x to the right, y down, z into the scene); the camera's centre in the world, (3,).
+
+    Raises:
+        InputError: no list of frames, or a matrix that is not a pose.
+    """
+    listed = tree.get("frames")
+    if not isinstance(listed, list) or not all(isinstance(frame, dict) for frame in listed):
+        raise InputError(f'{path} has no list "frames" of photographs with poses')
+    for number, frame in enumerate(listed):
+        where = f"{path}: frame {number}"
+        matrix = numbers(frame.get("transform_matrix"), "transform_matrix", where, (4, 4), (3, 4))
+        yield where, {**tree, **frame}, rotation_of(matrix[:3, :3] * [1, -1, -1], where), matrix[:3, 3]
+
+
+def numbers(given: Any, name: str, where: str, *shapes: tuple[int, ...]) -> NDArray[np.float64]:
+    """An array of finite numbers in one of the shapes, from JSON.
+
+    Raises:
+        InputError: anything else.
+    """
+    try:
+        found = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        found = np.empty(0)
+    if found.shape not in shapes or not np.isfinite(found).all():
+        raise InputError(f"{where}: {name} is not {'×'.join(map(str, shapes[0]))} finite numbers")
+    return found
+
+
+def rotation_of(axes: NDArray[np.float64], where: str) -> NDArray[np.float64]:
+    """The rotation from the world to a camera that is nearest to its axes.
+
+    Args:
+        axes: 3×3, columns are the camera's axes in the world, all of one length.
+        where: the camera, for messages.
+
+    Raises:
+        InputError: mirrored, stretched or skewed axes.
+    """
+    size = np.cbrt(np.linalg.det(axes))
+    if not (size > 1e-9 and np.allclose(axes.T @ axes / size**2, np.eye(3), rtol=0, atol=_ROTATED)):
+        raise InputError(f"{where}: its axes are not a rotation, but mirrored, stretched or skewed")
+    left, _, right = np.linalg.svd(axes)
+    nearest: NDArray[np.float64] = (left @ right).T
+    return nearest
 
 
 def _lens(given: dict[str, Any], file: Path, where: str) -> LensModel:

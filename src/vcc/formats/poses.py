@@ -9,15 +9,15 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from vcc.base.errors import InputError
 from vcc.base.reading import check_file, expanded, read_text, reading
-from vcc.formats import colmap
+from vcc.formats import colmap, nerf_transforms
 from vcc.formats.lens_models import LensModel
 
 Vector = tuple[float, float, float]
@@ -75,69 +75,50 @@ def read_poses(path: str | PathLike[str]) -> list[PosedCamera]:
             tree = json.loads(text)
         except ValueError as error:
             raise InputError(f"it is not JSON: {error}") from None
-        frames = tree.get("frames") if isinstance(tree, dict) else tree
-        if not isinstance(frames, list) or not all(isinstance(frame, dict) for frame in frames):
-            raise InputError("it has neither a list of cameras nor a list of frames, each an object")
-        if not frames:
+        cameras = list(_of_transforms(tree, found) if isinstance(tree, dict) else _of_splatting(tree))
+        if not cameras:
             raise InputError("it has no cameras")
-        of_frame = _of_transforms if isinstance(tree, dict) else _of_splatting
-        shared = tree if isinstance(tree, dict) else {}
-        return [of_frame(number, shared | frame) for number, frame in enumerate(frames)]
+        return cameras
 
 
-def _of_transforms(number: int, frame: dict[str, Any]) -> PosedCamera:
-    name = str(frame.get("file_path", number))
-    matrix = _numbers(frame, "transform_matrix", (4, 4), name)[:3]
-    width, focal, angle = (frame.get(key) for key in ("w", "fl_x", "camera_angle_x"))
-    if focal is not None and width is not None:
-        return _camera(name, matrix * [1, -1, -1, 1], _angle(width, focal, name))
-    if not (isinstance(angle, int | float) and 0 < angle < math.pi):
-        raise InputError(
-            f"camera {name} has neither w and fl_x nor a camera_angle_x between 0 and π: {angle!r:.40}"
-        )
-    return _camera(name, matrix * [1, -1, -1, 1], float(angle))
+def _of_transforms(tree: dict[str, Any], path: Path) -> Iterator[PosedCamera]:
+    for where, stated, rotation, centre in nerf_transforms.frames(tree, path):
+        width, focal, angle = (stated.get(key) for key in ("w", "fl_x", "camera_angle_x"))
+        if focal is not None and width is not None:
+            angle = _angle(width, focal, where)
+        elif not (isinstance(angle, int | float) and 0 < angle < math.pi):
+            raise InputError(f"{where} has neither w and fl_x nor a camera_angle_x between 0 and π: {angle!r:.40}")
+        yield _camera(str(stated.get("file_path", where)), rotation, centre, float(angle))
+
+
+def _of_splatting(tree: Any) -> Iterator[PosedCamera]:
+    if not isinstance(tree, list) or not all(isinstance(frame, dict) for frame in tree):
+        raise InputError("it has neither a list of cameras nor a list of frames, each an object")
+    for number, frame in enumerate(tree):
+        name = str(frame.get("img_name", number))
+        where = f"camera {name}"
+        axes = nerf_transforms.numbers(frame.get("rotation"), "rotation", where, (3, 3))
+        centre = nerf_transforms.numbers(frame.get("position"), "position", where, (3,))
+        angle = _angle(frame.get("width"), frame.get("fx"), where)
+        yield _camera(name, nerf_transforms.rotation_of(axes, where), centre, angle)
 
 
 def _of_colmap(name: str, lens: LensModel, rotation: Any, centre: Any) -> PosedCamera:
-    angle = _angle(lens.width, lens.focal_lengths[0], name)
-    return _camera(name, np.column_stack([rotation.T, centre]), angle)
+    return _camera(name, rotation, centre, _angle(lens.width, lens.focal_lengths[0], f"camera {name}"))
 
 
-def _of_splatting(number: int, frame: dict[str, Any]) -> PosedCamera:
-    name = str(frame.get("img_name", number))
-    turn, place = _numbers(frame, "rotation", (3, 3), name), _numbers(frame, "position", (3,), name)
-    return _camera(
-        name, np.column_stack([turn, place]), _angle(frame.get("width"), frame.get("fx"), name)
-    )  # fmt: skip
-
-
-def _numbers(frame: dict[str, Any], key: str, shape: tuple[int, ...], name: str) -> Any:
-    try:
-        values = np.asarray(frame.get(key), dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        values = np.empty(0)
-    if values.shape != shape or not np.isfinite(values).all():
-        raise InputError(f"camera {name}: {key} is not {'×'.join(map(str, shape))} finite numbers")
-    return values
-
-
-def _angle(width: Any, focal: Any, name: str) -> float:
+def _angle(width: Any, focal: Any, where: str) -> float:
     for number in (width, focal):
         if isinstance(number, bool) or not isinstance(number, int | float) or not 0 < number < 1e9:
             raise InputError(
-                f"camera {name}: its width and focal length are pixels, not {width!r:.30} and {focal!r:.30}"
+                f"{where}: its width and focal length are pixels, not {width!r:.30} and {focal!r:.30}"
             )
     return 2 * math.atan(width / focal / 2)
 
 
-def _camera(name: str, matrix: Any, field_of_view: float) -> PosedCamera:
-    """A camera of (3, 4), world from camera, with x right, y down and z forwards."""
-    turn = matrix[:, :3]
-    size = np.cbrt(np.linalg.det(turn))  # some programs scale poses
-    if not (size > 1e-9 and np.allclose(turn.T @ turn, size * size * np.eye(3), atol=2e-3 * size * size)):
-        raise InputError(f"camera {name}: its axes are not a rotation, but mirrored, stretched or skewed")
-    _, down, forward = (turn / size).T
-    return PosedCamera(name, _vector(matrix[:, 3]), _vector(forward), _vector(-down), field_of_view)
+def _camera(name: str, rotation: Any, centre: Any, field_of_view: float) -> PosedCamera:
+    _, down, forward = rotation
+    return PosedCamera(name, _vector(centre), _vector(forward), _vector(-down), field_of_view)
 
 
 def _vector(values: Any) -> Vector:

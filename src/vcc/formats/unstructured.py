@@ -271,7 +271,7 @@ class UnstructuredViews(Brief):
             raise InputError(
                 f"{path}: the cameras are {short(float(np.sqrt(np.mean(plane.off**2))))} off a plane (root mean "
                 f"square), which is an error of {rms:.3g} pixels at the borders of views, more than "
-                f"off_plane={off_plane:g}. {_WAY_OUT}, or accept the error with a larger off_plane"
+                f"off_plane={off_plane:g}. {_WAY_OUT}, or accept the error: pass a larger off_plane=…"
             )
         slope = 1 / (scale * float(np.median([one.focal_lengths[0] for one in lenses])))
         focus = 2 / (1 / near + 1 / far) if focus_distance is None else focus_distance
