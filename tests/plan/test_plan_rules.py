@@ -14,6 +14,7 @@ from scipy.integrate import quad
 import vcc
 from vcc.base.affine import Affine
 from vcc.base.units import mm
+from vcc.fields.filling import filling_of
 from vcc.optics.deflections import CellDeflection
 from vcc.plan.choice import compile_best
 from vcc.plan.depth_rule import Parallax, denser
@@ -122,6 +123,10 @@ def test_as_many_views_are_made_as_lie_a_pixel_apart(views, gap, times):
     assert made.extent == (views[0] * times[0], views[1] * times[1])
     assert made.disparity_range == pytest.approx((disparity / times[1], disparity / times[1]), rel=1e-5)
     assert ("would be needed" in reason) == (gap > 16)
+    given = np.arange(views[0] * views[1]).reshape(views) > 0
+    partly = replace(field.grid, filling=filling_of(given, 0.1, 0.0))  # views between have no marks of their own
+    again = denser(camera, partly)[0]
+    assert (again.shape, again.frame, again.filling) == (made.shape, made.frame, None)
     assert between.cautions() == ()
     steps = [np.eye(5)[n, :4] for n in range(4)]
     origin = made.frame(np.zeros(4))

@@ -161,6 +161,7 @@ def denser(train: Train, grid: Grid) -> tuple[Grid, ViewsBetween | None, str]:
         disparity_range=(min(low / i, high / i), max(low / i, high / i)),
         disparities=Disparities(),
         extent=(rows * j, columns * i),
+        filling=None,
     )
     reason = f"{spread}: {j}×{i} views are made for each one, looking along each pixel's own parallax ({source})"
     if max(wanted) > MOST_TIMES:
