@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import panels
+from numpy.typing import NDArray
 
 from vcc.base.errors import ResultWarning
 from vcc.files.transfer import encode
@@ -23,10 +24,7 @@ def main(folder: Path = HERE) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stored = panels.desk()
     white, desk = panels.white(stored), stored.read()
-    star = np.zeros((9, 9), bool)
-    star[4] = star[:, 4] = True
-    np.fill_diagonal(star, True)
-    np.fill_diagonal(star[::-1], True)
+    star = star_of(9)
     places = tuple((int(row), int(column)) for row, column in np.argwhere(star))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResultWarning)
@@ -51,6 +49,15 @@ def main(folder: Path = HERE) -> None:
     )
     panels.framed(axes[3], difference, "difference, 8 times")
     figure.savefig(folder / "star.png")
+
+
+def star_of(views: int) -> NDArray[np.bool_]:
+    """The middle row and column and the diagonals of a square grid of views."""
+    star = np.zeros((views, views), bool)
+    star[views // 2] = star[:, views // 2] = True
+    np.fill_diagonal(star, True)
+    np.fill_diagonal(star[::-1], True)
+    return star
 
 
 def _frame(row: int, column: int):  # type: ignore[no-untyped-def]

@@ -436,9 +436,7 @@ def _rectified(
             f"{lens.height}: pass the folder of the original pictures as images=…"
         )
     light = decode(picture) if bits < 32 else picture.astype(np.float32)
-    light = np.repeat(light[..., None], 3, axis=2) if light.ndim == 2 else light[..., :3]
-    if light.shape[2] == 1:
-        light = np.repeat(light, 3, axis=2)
+    light = np.broadcast_to(np.atleast_3d(light)[..., :3], (*light.shape[:2], 3))
     finer = max(1, math.floor(1 / scale + 0.01))  # smaller views: means over whole pixels first
     light = averaged(light, finer) if finer > 1 else light
     rows, columns = grid.shape[2:4]
