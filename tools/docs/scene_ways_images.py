@@ -1,7 +1,8 @@
 """Draw one camera in front of one scene by each way to a light field: python tools/docs/scene_ways_images.py.
 
-The reference are the rendered views of the desk. All other light fields have the same grid of 9×9 views. The program
-prints how far each image is from that of the reference, and the processor time of its light field. Run webp.py after it.
+The reference are the rendered views of the desk. All other light fields have the same grid of 9×9 views. The
+program prints how far each image is from that of the reference, and the processor time of its light field. Run
+webp.py after it.
 """
 
 from __future__ import annotations
