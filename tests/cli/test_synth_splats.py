@@ -80,11 +80,14 @@ def test_views_from_a_file_by_an_executor_have_the_same_bytes(folder):
     ("text", "message"),
     [
         ("views = [3", "views.toml is not TOML"),
+        ("views = " + "[" * 9999, "views.toml is not TOML"),
         ('colour = "red"', "colour does not describe views"),
-        ("views = {}", "views is {}"),
+        ("views = {}", "views is {}: write two whole numbers"),
         ("views = [3, 3]\naperture = 20", "aperture"),
         ('direction = "0, 0, 1"', "--direction"),
-        ("views = [3, 2.5]", "it is a whole number"),
+        ("views = [3, 2.5]", "views is [3, 2.5]: write two whole numbers"),
+        ('camera_from = ["a.json", "b.json"]', "write the name of a file"),
+        ('aperture = "--help"', '--aperture is "--help"'),
     ],
 )
 def test_files_of_views_that_are_none(folder, text, message):

@@ -180,7 +180,7 @@ def _rendered(
             yield place, view, clipped
             done += 1
     except InputError as error:
-        raise InputError(f"{error}\n{hint.format(done=done)}") from error
+        raise InputError(f"{error}\n{hint.replace('{done}', str(done))}") from error
 
 
 def _one_by_one(task: _Task, places: Sequence[_Place]) -> Iterator[tuple[_Place, _View]]:

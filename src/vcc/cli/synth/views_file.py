@@ -37,6 +37,11 @@ NAMES = (
     _PATH,
 )
 """The entries of a file; a renderer without such an option does not accept it."""
+_WRITTEN = {
+    **dict.fromkeys(_COUNTS, "two whole numbers, such as [9, 9]"),
+    _PATH: "the name of a file",
+    "": "a number, a quantity as text, or a list of them",
+}
 
 
 def with_views(arguments: Sequence[str]) -> list[str]:
@@ -62,17 +67,16 @@ def with_views(arguments: Sequence[str]) -> list[str]:
 def _options(path: Path) -> list[str]:
     try:
         tree = tomllib.loads(read_text(path, "file of views"))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise InputError(f"{path} is not TOML: {error}") from None
     options = []
     for name, value in tree.items():
         if name not in NAMES:
             raise InputError(f"{path}: {name} does not describe views: the entries are {', '.join(NAMES)}")
         listed = value if isinstance(value, list) else [value]
-        if not listed or not all(type(each) in (str, int, float) for each in listed):
-            raise InputError(
-                f"{path}: {name} is {value!r:.60}: write a number, a quantity as text, or a list of them"
-            )
+        kinds = {_PATH: (str,)}.get(name, (int,) if name in _COUNTS else (str, int, float))
+        if not listed or not all(type(each) in kinds for each in listed) or (name == _PATH and len(listed) > 1):
+            raise InputError(f"{path}: {name} is {value!r:.60}: write {_WRITTEN.get(name, _WRITTEN[''])}")
         texts = [str(each) for each in listed]
         if name == _PATH:
             texts = [str(path.parent / texts[0])]
