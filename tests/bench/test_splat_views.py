@@ -132,6 +132,7 @@ def test_the_command_opens_a_file_of_splats(tmp_path, monkeypatch):
     exec(field.source, made)
     assert np.array_equal(made["light_field"].values, field.better.whole().values)
     assert "for a scene of Gaussian splats" in refused("bench", "--unit", "50 cm")
+    assert "leave out --missing" in refused("bench", "balls.ply", "--missing", "fill")
     assert "are behind the array" in refused("bench", "balls.ply", "--eye", "0, 0, 9", "--target", "0, 0, 99")
 
 

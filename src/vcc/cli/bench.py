@@ -21,7 +21,7 @@ from vcc.bench.starting import presets
 from vcc.camera_file import load_camera
 from vcc.cli.console import show
 from vcc.cli.options import Reading, Whole, given_options
-from vcc.cli.synth.splats import Standing
+from vcc.cli.synth.splats import Standing, show_left_out
 from vcc.files.camera_reading import Beside, read_tables, train_of_tables
 from vcc.light_field import LightField
 from vcc.optics.train import Train
@@ -67,6 +67,8 @@ def bench(
     of_splats = light_field is not None and light_field.suffix.lower() in SPLAT_ENDINGS
     if not of_splats and (wrong := given_options(standing)):
         raise InputError(f"{', '.join(wrong)}: for a scene of Gaussian splats, {', '.join(SPLAT_ENDINGS)}")
+    if of_splats and (wrong := given_options(reading)):
+        raise InputError(f"{name} is a scene of Gaussian splats, which is rendered: leave out {', '.join(wrong)}")
     shown = Gallery(cameras(SCENE), SCENE)
     if camera is None:
         first = next(iter(shown)) if gallery is None else title_of(gallery)
@@ -114,7 +116,9 @@ def _splats(path: Path, standing: Standing, train: Train) -> tuple[Field, float]
     """The views of a scene of splats for a camera, and the distance at which they converge, metres."""
     cloud = read_splats(path)
     viewpoint, _ = standing.viewpoint(cloud)
-    views = SplatViews.before(train, SplatScene(cloud, viewpoint))
+    scene = SplatScene(cloud, viewpoint)
+    show_left_out(scene)
+    views = SplatViews.before(train, scene)
     show(f"views converge at {short(views.focus_distance, digits=3)}")
     return views.field(str(path.expanduser().resolve())), float(f"{views.focus_distance:.4g}")
 

@@ -160,14 +160,19 @@ def splats(
     cloud = read_splats(splats)
     viewpoint, field_of_view = standing.viewpoint(cloud)
     scene = SplatScene(cloud, viewpoint, **options)
-    if scene.left_out:
-        count = f"{scene.left_out} of {len(cloud.positions)} splats"
-        show(f"{count} are in front of the views, but nearer than {drawing.near:g} units: left out (--near)")
+    show_left_out(scene, " (--near)")
     cameras = where.array(scene, field_of_view, parallax or 1.0)
     focus = cameras.focus_distance
     converge = "parallel views" if focus == float("inf") else f"views converge at {short(focus, digits=3)}"
     show(f"{converge}, {short(cameras.spacings[1], digits=3)} apart")
     make(scene, cameras, output, dtype, by)
+
+
+def show_left_out(scene: SplatScene, way_out: str = "") -> None:
+    """Report the splats that are too near to be drawn, if there are any."""
+    if scene.left_out:
+        count = f"{scene.left_out} of {len(scene.splats.positions)} splats"
+        show(f"{count} are in front of the views, but nearer than {scene.near:g} units: left out{way_out}")
 
 
 def _look(
