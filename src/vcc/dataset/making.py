@@ -136,6 +136,8 @@ def make_dataset(
     with Notices().gathered():  # pair 0 is made again with its shard
         first = Shard(recipe, None).pairs([0])
         card = card_of(recipe, per_shard, licence, next(first))
+    if executor is not None:
+        vars(_local).clear()  # the scene: workers open their own
     check_name(path)
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be made: there is no folder {path.parent}; make it first")
@@ -157,6 +159,7 @@ def make_dataset(
             raise KeyboardInterrupt(kept) from None
         raise InputError(str(error) if str(path) in str(error) else f"{error}. {kept}") from error.__cause__
     finally:
+        vars(_local).clear()
         lock.give_back()
     remarks.say(count, "pairs")
     return open_dataset(path)
@@ -190,8 +193,8 @@ def _run(work: Shard, executor: Any, remarks: Notices, progress: Progress | None
                 work.write(shard, lambda more, before=done: tell(progress, before + more, total))
             done += len(disk.pairs_of(shard))
         return
-    limit = work.recipe.how
-    alone = replace(work, recipe=replace(work.recipe, how=replace(limit, threads=limit.threads or 1)))
+    how = work.recipe.how
+    alone = replace(work, recipe=replace(work.recipe, how=replace(how, threads=how.threads or 1)))
     with remarks.gathered():
         for number, said in worker_pool(executor).each(Work(_written_elsewhere, (alone, os.getpid())), left):
             remarks.add(said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -34,8 +35,9 @@ WHITE_SIDE, WHITE_SHARE = 8, 0.5
 sensor over this share of a window's sides."""
 WHITE_SAMPLES = 64
 """Samples along a side of the views of the uniform scene."""
-KEPT_CAMERAS = 1024
+KEPT_CAMERAS = 256
 """Cameras of which point spreads and the image of a uniform scene are kept."""
+_one_thread = threading.Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +196,7 @@ class Recorder(Brief):
         few = replace(
             sensor, shape=(WHITE_SIDE, WHITE_SIDE), pitch=(down, across), decentre=whole.decentre, electronics=None
         )
-        with warnings.catch_warnings():
+        with _one_thread, warnings.catch_warnings():  # filters belong to all threads
             warnings.simplefilter("ignore", ResultWarning)
             found = camera.replace(sensor=few).capture(scene.white, self.recipe.how).to_numpy()
         means = [float(each) for each in np.atleast_1d(found.mean(axis=(0, 1), dtype=np.float64))]
