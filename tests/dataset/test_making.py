@@ -222,6 +222,9 @@ def test_what_cannot_be_made_leaves_nothing(tmp_path):
         ("scene 0 is a int", lambda: make_dataset(out, CAMERA, 3)),
         ("at least one scene", lambda: make_dataset(out, CAMERA, [])),
         ("there is no folder", lambda: make_dataset(tmp_path / "no" / "out", CAMERA, SCENES)),
+        ("crop is", lambda: make_dataset(out, CAMERA, SCENES, crop=64)),
+        ("truth is a list", lambda: make_dataset(out, CAMERA, SCENES, truth=None)),
+        ("executor must be", lambda: make_dataset(out, CAMERA, SCENES, executor="processes")),
         ("per_shard", lambda: make_dataset(out, CAMERA, SCENES, per_shard=0)),
         ("no parameter|has no", lambda: make_dataset(out, CAMERA, SCENES, {"cod.pattern": CODES})),
     ):

@@ -15,7 +15,7 @@ from vcc.base import checks
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded
+from vcc.base.reading import expanded, reading
 from vcc.dataset.shards import Shards, shards_at
 
 Numbers = Literal["radiance", "digital"]
@@ -65,7 +65,8 @@ class Pairs(Brief, Sequence[dict[str, Any]]):
             raise IndexError(f"there are {len(self)} pairs, and no number {number}")
         arrays, numbers = self.disk.read(int(number) % len(self))
         if self.numbers == "radiance":
-            arrays["recording"] = self._radiance(arrays["recording"], numbers)
+            with reading(self.path, "a data set"):
+                arrays["recording"] = self._radiance(arrays["recording"], numbers)
         return {**arrays, "numbers": numbers}
 
     def _radiance(self, recording: NDArray[Any], numbers: dict[str, Any]) -> NDArray[np.float32]:

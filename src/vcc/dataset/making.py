@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal
@@ -117,19 +117,20 @@ def make_dataset(
         cameras_of(cameras, parameters),
         scenes_of(scenes),
         count,
-        (truth,) if isinstance(truth, str) else tuple(truth),
-        None if crop is None else tuple(crop),  # type: ignore[arg-type]
+        _several("truth", truth, str),
+        None if crop is None else checks.counts("crop", crop, "rows", "columns"),  # type: ignore[arg-type]
         flips,
         gain,
         color_gain,
         exposure,
         radiance,
-        tuple(psf_distances),
+        _several("psf_distances", psf_distances, (int, float)),
         psf_size,
         seed,
         chosen,
     )
     if executor is not None:
+        worker_pool(executor)  # checked before anything is written
         for scene in recipe.scenes:
             if isinstance(scene.source, InMemory):
                 check_portable(scene.source)
@@ -163,6 +164,15 @@ def make_dataset(
         lock.give_back()
     remarks.say(count, "pairs")
     return open_dataset(path)
+
+
+def _several(name: str, given: Any, kind: Any) -> tuple[Any, ...]:
+    """One value, or several, as a tuple."""
+    if isinstance(given, kind):
+        return (given,)
+    if not isinstance(given, Iterable):
+        raise InputError(f"{name} is a list of values, not {given!r}")
+    return tuple(given)
 
 
 def _check_same(there: Shards, card: dict[str, Any]) -> None:

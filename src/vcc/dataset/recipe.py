@@ -76,8 +76,6 @@ class Recipe(Brief):
         if len(set(self.truth)) != len(self.truth):
             raise InputError(f"truth names something twice: {', '.join(self.truth)}")
         checks.seed(self.seed)
-        if self.crop is not None:
-            checks.counts("crop", self.crop, "rows", "columns")
         for name in ("gain", "color_gain"):
             if (given := getattr(self, name)) is not None:
                 _interval(name, given, "factors")

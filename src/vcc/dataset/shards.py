@@ -25,6 +25,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import check_path, read_bytes, read_json, reading
 from vcc.camera import Camera
 from vcc.dataset.card import CAMERA, FORMAT_VERSION
+from vcc.dataset.recipe import MOST_PAIRS
 from vcc.dataset.recording_pairs import Pair
 from vcc.files.atomic import atomic_path, refusal
 from vcc.files.npy import write_npy
@@ -61,7 +62,8 @@ class Shards(Brief):
 
     def left(self) -> list[int]:
         """The shards that are missing."""
-        return [shard for shard in range(self.card["shards"]) if not self.file(shard).is_file()]
+        there = {each.name for each in self.path.iterdir()}
+        return [shard for shard in range(self.card["shards"]) if self.file(shard).name not in there]
 
     def create(self, text: str, camera: Camera) -> None:
         """Make the folder with its card, under a temporary name until it is complete.
@@ -127,14 +129,18 @@ class Shards(Brief):
                     stream.seek(place[0])
                     found[name] = stream.read(place[1])
             numbers = read_json(found.pop("json"), f"{file}: {key}.json")
+            if lacking := self.card["numbers"].keys() - numbers.keys():
+                raise InputError(f"{file} is damaged: {key}.json lacks {', '.join(sorted(lacking))}")
             return {name.removesuffix(".npy"): self._array(name, data) for name, data in found.items()}, numbers
 
     def _array(self, name: str, data: bytes) -> NDArray[Any]:
-        stated = self.card["arrays"][name.removesuffix(".npy")]
-        values = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-        if list(values.shape) != stated["shape"] or values.dtype.name != stated["dtype"]:
-            raise InputError(f"{name} is {values.shape} {values.dtype}, and the card states {stated}")
-        return values
+        """The array of a file, whose header must state what the card states."""
+        stated, stream = self.card["arrays"][name.removesuffix(".npy")], io.BytesIO(data)
+        np.lib.format.read_magic(stream)
+        shape, _, kind = np.lib.format.read_array_header_1_0(stream)
+        if list(shape) != stated["shape"] or kind.name != stated["dtype"] or kind.hasobject:
+            raise InputError(f"{name} is {shape} {kind}, and the card states {stated['shape']} {stated['dtype']}")
+        return np.frombuffer(data, kind, offset=stream.tell()).reshape(shape).copy()
 
 
 def _add(tar: tarfile.TarFile, name: str, data: io.BytesIO) -> None:
@@ -154,7 +160,9 @@ def shards_at(path: Path) -> Shards:
     check_path(path, "data set")
     file = path / CARD
     if not file.is_file():
-        raise InputError(f"{path} is no data set of vcc: it contains no {CARD}")
+        raise InputError(
+            f"{path} is no data set of vcc: it contains no {CARD}. Give the folder of one, or a new name"
+        )
     card = read_json(read_bytes(file), str(file))
     counts = [card.get(name) for name in ("format_version", "pairs", "pairs_per_shard", "shards")]
     if not all(type(each) is int and each > 0 for each in counts):
@@ -168,6 +176,7 @@ def shards_at(path: Path) -> Shards:
     stated = isinstance(arrays, dict) and all(
         isinstance(each, dict) and "shape" in each for each in arrays.values()
     )
-    if shards != -(-pairs // per_shard) or not stated or "recording" not in arrays:  # type: ignore[operator]
+    stated = stated and "recording" in arrays and isinstance(card.get("numbers"), dict)  # type: ignore[operator]
+    if shards != -(-pairs // per_shard) or pairs > MOST_PAIRS or not stated:
         raise InputError(f"{file} is damaged: pairs, shards and arrays do not fit together")
     return Shards(path, card)
