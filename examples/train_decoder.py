@@ -56,7 +56,7 @@ def camera_of(pixels: tuple[int, int]) -> vcc.Camera:
     return vcc.Camera.focused(elements, sensor, 0.9)
 
 
-def made(path: Path, scenes: list, pixels: tuple[int, int], count: int) -> Pairs:
+def made(path: Path, scenes: list, pixels: tuple[int, int], count: int, **more: object) -> Pairs:
     """A data set of some scenes; the same call opens one that is there."""
     return make_dataset(
         path,
@@ -70,6 +70,7 @@ def made(path: Path, scenes: list, pixels: tuple[int, int], count: int) -> Pairs
         exposure=(2 * ms, 8 * ms),
         radiance=0.01,
         seed=1,
+        **more,
     )
 
 
@@ -166,8 +167,10 @@ def main() -> None:
     asked.out.mkdir(parents=True, exist_ok=True)
     began = time.time()
     count = max(asked.pairs // 12, 1)
-    learned_from = made(asked.out / "train", [drawn(n) for n in range(count)], (96, 96), asked.pairs)
-    drawn_anew = made(asked.out / "test", [drawn(10_000 + n) for n in range(10)], (96, 96), 40)
+    # Leaves are grey and bright: gains make them coloured, and as dark and noisy as other scenes.
+    gains = {"gain": (0.03, 1.0), "color_gain": (0.5, 2.0)}
+    learned_from = made(asked.out / "train", [drawn(n) for n in range(count)], (96, 96), asked.pairs, **gains)
+    drawn_anew = made(asked.out / "test", [drawn(10_000 + n) for n in range(10)], (96, 96), 40, **gains)
     desk = made(asked.out / "desk", [open_store(DESK)[1:8, 1:8]], (320, 480), 40)
     print(f"{len(learned_from)} pairs after {time.time() - began:.0f} s", flush=True)
     model = trained(learned_from, asked.steps)

@@ -63,6 +63,8 @@ NUMBERS = {
     "dn_per_radiance": "digital numbers above dark_dn of a uniform scene of radiance 1, in each channel",
     "irradiance_of_white": "irradiance of a uniform scene of radiance 1, in each channel",
     "missing_rays": "share of the camera's rays that are outside the light field",
+    "depth_source": "where the disparities of the scene come from",
+    "depth_unmatched": "share of its pixels at which views differ at the estimated disparity; 0 if given",
     "views_frame": "5×5, see views",
 }
 """Meaning of each number of a pair."""

@@ -222,7 +222,9 @@ class Recorder(Brief):
         column, row = (np.rint(each).astype(int) for each in (k, l))
         inside = (column >= 0) & (column < ns) & (row >= 0) & (row < nt)
         found = scene.distances[np.clip(row, 0, nt - 1), np.clip(column, 0, ns - 1)]
-        return _flipped(np.where(inside, found, np.nan), drawn), {}
+        maps = scene.grid.disparities.maps()
+        said = {"depth_source": maps.source, "depth_unmatched": maps.unmatched}
+        return _flipped(np.where(inside, found, np.nan), drawn), said
 
     def _views(self, camera: Camera, drawn: Drawn, scene: Opened) -> tuple[NDArray[Any], dict[str, Any]]:
         k, l = _places(camera, scene.grid)
