@@ -12,7 +12,7 @@ from vcc.dataset.recipe import Recipe
 from vcc.dataset.recording_pairs import Opened, Recorder
 from vcc.dataset.scenes import scenes_of
 from vcc.sweeps.design import cameras_of
-from vcc.units import mm
+from vcc.units import mm, nm
 
 pytestmark = pytest.mark.filterwarnings("ignore::vcc.ResultWarning")
 
@@ -153,6 +153,26 @@ def test_recordings_are_in_units_of_the_sharp_image_with_the_noise_of_their_phot
         assert np.all(np.abs(light.mean((0, 1)) - 0.6 * gain) < 5 * np.sqrt(variance / n) / scale)
         assert np.all(np.abs(light.var((0, 1)) * scale**2 / variance - 1) < 5 * np.sqrt(2 / n))
     assert np.ptp(gains) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("lens", "sensor"),
+    [
+        (vcc.Lens(FOCAL, diameter=9 * mm), {"response": "mono"}),
+        (vcc.Lens(FOCAL, diameter=9 * mm, glass="N-BK7"), {"fill_factor": 0.5}),
+        (vcc.load_lens("double-gauss-50mm", model="real"), {}),
+    ],
+    ids=["mono", "glass", "real lens"],
+)
+def test_a_uniform_scene_has_its_radiance_through_any_camera(lens, sensor):
+    values = np.full((5, 5, 50, 60, 3), 0.6, np.float32)
+    scene = field_of(values).with_wavelengths([610 * nm, 540 * nm, 465 * nm])
+    camera = vcc.Camera.focused([lens], vcc.Sensor(0, (40, 48), 0.1 * mm, **sensor), FOCUS)
+    pair = pair_of(recipe_of(camera, scene))
+    white = np.array(pair.numbers["irradiance_of_white"])
+    # rays of the real lens, 64 a pixel, differ by random numbers; the rest is float32
+    assert np.allclose((pair.arrays["recording"] / white).mean((0, 1)), 0.6, rtol=2e-3)
+    assert np.allclose(pair.arrays["sharp"], 0.6, rtol=1e-5)
 
 
 def test_settings_change_only_what_they_are_about():

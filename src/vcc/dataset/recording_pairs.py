@@ -256,7 +256,10 @@ class Recorder(Brief):
         size = (self.recipe.psf_size,) * 2
 
         def made() -> NDArray[Any]:
-            return np.stack([psf(camera, each, shape=size).values for each in self.recipe.psf_distances])
+            try:
+                return np.stack([psf(camera, each, shape=size).values for each in self.recipe.psf_distances])
+            except InputError as error:
+                raise InputError(f'{error}; or leave "psf" out of truth') from error.__cause__
 
         return _flipped(self._of_camera("psf", drawn, None, made), drawn, 1), {}
 
