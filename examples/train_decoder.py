@@ -168,7 +168,7 @@ def main() -> None:
     began = time.time()
     count = max(asked.pairs // 12, 1)
     # Leaves are grey and bright: gains make them coloured, and as dark and noisy as other scenes.
-    gains = {"gain": (0.03, 1.0), "color_gain": (0.5, 2.0)}
+    gains = {"gain": (0.003, 0.3), "color_gain": (0.5, 2.0)}
     learned_from = made(asked.out / "train", [drawn(n) for n in range(count)], (96, 96), asked.pairs, **gains)
     drawn_anew = made(asked.out / "test", [drawn(10_000 + n) for n in range(10)], (96, 96), 40, **gains)
     desk = made(asked.out / "desk", [open_store(DESK)[1:8, 1:8]], (320, 480), 40)

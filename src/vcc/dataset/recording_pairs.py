@@ -40,8 +40,8 @@ KEPT_CAMERAS = 256
 _one_thread = threading.Lock()
 
 
-@dataclass(frozen=True, eq=False)
-class Pair:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pair(Brief):
     """A recording, its ground truth, and the numbers that belong to it."""
 
     arrays: Arrays
