@@ -143,8 +143,11 @@ def test_webdataset_reads_the_shards(pairs):
         assert each["json"] == stored[number]["numbers"]
 
 
-def test_a_loader_of_pytorch_reads_it_with_workers(pairs):
-    loader = torch.utils.data.DataLoader(pairs, batch_size=4, shuffle=True, num_workers=2)
+def test_a_loader_of_pytorch_reads_it_in_a_worker(pairs):
+    # Spawned: JAX, if another test has loaded it, must not be forked.
+    loader = torch.utils.data.DataLoader(
+        pairs, batch_size=4, shuffle=True, num_workers=1, multiprocessing_context="spawn"
+    )
     sent, seen = pickle.loads(pickle.dumps(pairs)), []
     assert np.array_equal(sent[7]["recording"], pairs[7]["recording"])
     for batch in loader:
