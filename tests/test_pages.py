@@ -283,6 +283,10 @@ def quick(monkeypatch):
     for executor in ("concurrent.futures.ProcessPoolExecutor", "distributed.Client"):
         monkeypatch.setattr(executor, lambda *_, **__: ThreadPoolExecutor(1))
     monkeypatch.setattr("vcc.cli.executing._processes", lambda: ThreadPoolExecutor(1))
+    loader = torch.utils.data.DataLoader  # its workers are forked, which JAX of another page does not allow
+    monkeypatch.setattr(
+        "torch.utils.data.DataLoader", lambda *data, **how: loader(*data, **{**how, "num_workers": 0})
+    )
     monkeypatch.setitem(sys.modules, "optuna", Trials)
     # What a GPU does is tested in a simulator, at a few samples: here any array's engine stands in for its own.
     monkeypatch.setitem(sys.modules, "vcc.engines.cuda", array_api)

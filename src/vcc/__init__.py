@@ -101,6 +101,7 @@ _HOMES = {
 }
 _MODULES = {
     "analysis",
+    "dataset",
     "gallery",
     "glasses",
     "jax",

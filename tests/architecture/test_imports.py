@@ -43,6 +43,7 @@ ROOMS = [
     "analysis",
     "recover",
     "sweeps",
+    "dataset",
     "motion",
     "showcase",
     "gallery",

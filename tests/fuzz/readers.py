@@ -12,6 +12,7 @@ import numpy as np
 import vcc
 from vcc.cli.decode_lenslets import _listed
 from vcc.cli.info import describe
+from vcc.dataset import open_dataset
 from vcc.files.pictures import read_grey
 from vcc.formats import open_unstructured, read_ground_truth, read_lytro
 from vcc.formats.poses import read_poses
@@ -58,6 +59,11 @@ def sweep(path: Path) -> Read:
     swept = open_sweep(path)
     pictures = [swept[place].values for place in np.ndindex(*swept.shape) if swept.done[place]]
     return _read(swept.table, *pictures)
+
+
+def dataset(path: Path) -> Read:
+    pairs = open_dataset(path)
+    return _read(*(pair[name] for pair in pairs for name in pair))
 
 
 def poses(path: Path) -> Read:

@@ -23,6 +23,7 @@ import vcc
 from tests.fuzz.texts import CAMERA, HCI_CAMERA, LENS, MITSUBA_SCENE, MOVING, PBRT_SCENE
 from tests.sources.splat_bytes import gltf, packed_ply, spz
 from tests.sources.splat_clouds import cloud
+from vcc.dataset import make_dataset
 from vcc.sources.splats import write_ply
 from vcc.store import Lossy, create_video, save_store
 
@@ -317,6 +318,12 @@ def light_field_video(folder: Path) -> None:
 def sweep(folder: Path) -> None:
     camera = vcc.Camera([vcc.Lens(0.05, name="main")], vcc.Sensor(0.052, (6, 8), 0.0005))
     vcc.sweep(camera, light_field(), {"sensor.z": "51mm:53mm:3"}, metrics=["sharpness"], output=folder / "s.zarr")
+
+
+def dataset(folder: Path) -> None:
+    sensor = vcc.Sensor(0.052, (6, 8), 0.0005, electronics=vcc.Electronics())
+    camera = vcc.Camera([vcc.Lens(0.05, name="main")], sensor)
+    make_dataset(folder / "pairs", camera, light_field(), count=3, per_shard=2)
 
 
 def camera(ending: str) -> Maker:

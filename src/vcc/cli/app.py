@@ -57,6 +57,14 @@ COMMANDS = {
         'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness',
         'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv',
     ),
+    "dataset": (
+        "Make pairs of recordings and ground truth, for training.\n\n"
+        "Each pair has a camera of the design, a window of its sensor, an exposure and noise of its own. The "
+        "card, README.md, says how the set was made.",
+        'vcc dataset camera.toml scene.zarr -o pairs --set "code.pattern=mura,circle" --count 400 --crop 256 256',
+        'vcc dataset camera.toml one.zarr two.zarr -o pairs --set "sensor.z=50mm:54mm" --design sobol '
+        '--cameras 512 --sharp --depth --flips --exposure "1ms:20ms"',
+    ),
     "bench": (
         "Open the optical bench in the browser: move elements and see the image change.\n\n"
         "Without a camera and a light field it opens a lens before the demo's scene.",

@@ -34,7 +34,7 @@ from vcc.sweeps.table import ENDINGS
 TOLD = Group("The table", sort_key=1.5)
 
 
-def _setting(text: str, option: str) -> tuple[str, str]:
+def setting(text: str, option: str) -> tuple[str, str]:
     """The name of a parameter and its values, from NAME=VALUES."""
     name, equals, values = text.partition("=")
     if not (equals and name.strip() and values.strip()):
@@ -106,7 +106,7 @@ def sweep(
     light_field: LightFieldFile,
     /,
     *,
-    set: Annotated[tuple[tuple[str, str], ...], quantity("NAME=VALUES", _setting, repeated=True)],
+    set: Annotated[tuple[tuple[str, str], ...], quantity("NAME=VALUES", setting, repeated=True)],
     output: Output,
     design: Kind = "grid",
     count: Whole | None = None,

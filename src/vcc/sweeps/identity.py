@@ -28,6 +28,12 @@ def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any]
         light_field: before the cameras.
         how: how the images are made.
     """
+    found = of_cameras(cameras, how)
+    return found and {**found, "light field": of_light_field(light_field)}
+
+
+def of_cameras(cameras: Cameras, how: How) -> dict[str, Any] | None:
+    """The same without the light field."""
     try:
         parameters = {
             each.name: f"{each.values_in_words} ({fingerprint(list(each.values))})" for each in cameras.varied
@@ -40,7 +46,6 @@ def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any]
         "camera": camera,
         "axes": list(cameras.axes),
         "parameters": parameters,
-        "light field": _of_light_field(light_field),
         "how": {
             field.name: getattr(how, field.name)
             for field in fields(how)
@@ -50,7 +55,7 @@ def identity(cameras: Cameras, light_field: Samples, how: How) -> dict[str, Any]
     }
 
 
-def _of_light_field(light_field: Samples) -> str:
+def of_light_field(light_field: Samples) -> str:
     """A fingerprint of a light field: of all samples, or of a store's metadata and the sizes of its files."""
     grid = light_field.grid
     told = hashlib.sha256(repr((grid.shape, grid.kind.name, grid.sample)).encode())
