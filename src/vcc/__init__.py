@@ -116,6 +116,7 @@ _MODULES = {
     "sweeps",
     "torch",
     "units",
+    "zoo",
 }
 
 _INSTEAD = {

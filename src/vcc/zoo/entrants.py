@@ -29,8 +29,6 @@ from vcc.zoo.bench import REACH, SIDE, check_camera, of_lens
 WAVELENGTH = 550 * nm
 MOST_ROUND = math.pi / 4 + 1e-3
 """Light of the largest circle in the square, and the error of traced rays."""
-CURVE = (0.1, 0.04, 0.01)
-"""Light of further round stops, for the curve of what a stop alone reaches."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -103,7 +101,9 @@ def plates(focus: float) -> list[Entrant]:
     ]
 
 
-def with_controls(entrants: list[Entrant], lights: dict[str, float], focus: float) -> list[Entrant]:
+def with_controls(
+    entrants: list[Entrant], lights: dict[str, float], focus: float, curve: tuple[float, ...]
+) -> list[Entrant]:
     """Entrants and their controls: the open square, round stops and shorter exposures of the same light.
 
     A camera with more light than the largest circle, 79 %, is compared with the open square.
@@ -112,11 +112,12 @@ def with_controls(entrants: list[Entrant], lights: dict[str, float], focus: floa
         entrants: cameras to compare.
         lights: share of the light of each, by name.
         focus: distance in focus, metres.
+        curve: light of further round stops.
     """
     wide = open_square(focus)
     controls = {"open": Entrant("open", wide)}
     shares = {round(lights[each.name], 4) for each in entrants}
-    for light in sorted(shares | set(CURVE), reverse=True):
+    for light in sorted(shares | set(curve), reverse=True):
         if light <= MOST_ROUND:
             stop = round_stop(light, focus)
             controls[stop.name] = stop

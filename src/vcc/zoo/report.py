@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-STRIP = 7
+STRIP = 8
 """Cameras in a strip of pictures."""
+MARKERS = "DsP*X^"
 
 
 @dataclass(frozen=True)
@@ -182,35 +183,29 @@ class Report(Brief):
         """Quality over light, each camera by its best decoder: a panel for each light level."""
         from matplotlib.ticker import PercentFormatter
 
-        measure = self.task.measures[0]
-        figure = figures.new_figure(4.0 * len(LEVELS), 4.2)
-        for level, (axes, (name, electrons)) in enumerate(
-            zip(figure.subplots(1, len(LEVELS)), LEVELS.items(), strict=True)
-        ):
-            stops = [each for each in self.names("camera") if each.startswith("round ") or each == "open"]
-            times = [each for each in self.names("camera") if each.endswith("% of the time")]
-            others = [each for each in self.names("camera") if each not in {*stops, *times}]
-            for group, colour, marker, label in (
-                (stops, figures.QUIET, "o", "stops"),
-                (times, "#0072B2", "v", "shorter exposures"),
-                (others, figures.ACCENT, "D", "cameras"),
-            ):
-                light = [self.light(each) for each in group]
-                scores = [Score.of(self.by_scene(each, self.best(each, level), level)) for each in group]
-                order = np.argsort(light)
+        measure, names = self.task.measures[0], self.names("camera")
+        times = [each for each in names if each.endswith("% of the time")]
+        stops = [each for each in names if each.startswith("round ") or each == "open"]
+        groups = [("stops", stops, figures.QUIET, "o-"), ("shorter exposures", times, "#0072B2", "v")]
+        cameras = [each for each in names if each not in {*stops, *times}]
+        groups += [(each, [each], f"C{n % 10}", MARKERS[n % len(MARKERS)]) for n, each in enumerate(cameras)]
+        figure = figures.new_figure(4.0 * len(LEVELS), 4.6)
+        panels = figure.subplots(1, len(LEVELS))
+        for level, (axes, (name, electrons)) in enumerate(zip(panels, LEVELS.items(), strict=True)):
+            for label, group, colour, style in groups:
+                by_light = sorted(group, key=self.light)
+                scores = [Score.of(self.by_scene(each, self.best(each, level), level)) for each in by_light]
                 axes.errorbar(
-                    np.array(light)[order],
-                    np.array([each.mean for each in scores])[order],
-                    np.nan_to_num([each.error for each in scores])[order],
-                    fmt=f"{marker}-" if group is stops else marker,
+                    [self.light(each) for each in by_light],
+                    [each.mean for each in scores],
+                    np.nan_to_num([each.error for each in scores]),
+                    fmt=style,
                     color=colour,
-                    markersize=5,
+                    markersize=7,
                     linewidth=1,
+                    elinewidth=0.6,
                     label=label,
                 )
-            for each in others:
-                at = self.light(each), Score.of(self.by_scene(each, self.best(each, level), level)).mean
-                axes.annotate(each, at, (0, 6), textcoords="offset points", ha="right", fontsize=figures.LABEL - 1)
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(PercentFormatter(1))
             axes.set_title(f"{name}: {electrons:g} electrons", fontsize=figures.LABEL)
@@ -218,8 +213,8 @@ class Report(Brief):
             axes.set_ylabel(measure.heading if level == 0 else "", fontsize=figures.LABEL)
             if not measure.larger:
                 axes.invert_yaxis()
-            if level == 0:
-                axes.legend(fontsize=figures.LABEL, frameon=False)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=figures.LABEL, frameon=False)
         return figure
 
     def strip(self) -> Figure:

@@ -30,7 +30,7 @@ from vcc.run.executors import Work, worker_pool
 from vcc.zoo.bench import ELECTRONICS, LEVELS, SIDE, SLOPE, Kernels, exposed
 from vcc.zoo.decoders import Decoder, Recorded
 from vcc.zoo.entrants import Entrant, FromFile, loaded, with_controls
-from vcc.zoo.scenes import BUILT_IN, scene
+from vcc.zoo.scenes import BUILT_IN, identity, scene
 from vcc.zoo.tasks import TASKS, Task, task_named
 
 Array = NDArray[np.float64]
@@ -136,9 +136,12 @@ def run(
             raise InputError(f"--without {name}: the task {task} has {', '.join(sorted(names))}")
     entrants = [each for each in entrants if each.name not in without]
     functions = {name: function for name, function in functions.items() if name not in without}
-    for name in scenes:
-        chosen.truth(scene(name))  # unknown scenes end here, before any work
-    trials = [_trial(chosen, each, name, functions, seeds) for name in scenes for each in entrants]
+    contents = {name: identity(name) for name in scenes}
+    trials = [
+        _trial(chosen, each, name, content, functions, seeds)
+        for name, content in contents.items()
+        for each in entrants
+    ]
     with Store(output) as store:
         kept = store.keys()
         listed = [key for trial in trials for key in trial.keys]
@@ -160,12 +163,18 @@ def _entrants(task: Task, cameras: Sequence[Path]) -> list[Entrant]:
     names = [each.name for each in entrants]
     if len(set(names)) < len(names):
         raise InputError(f"two cameras have one name: {', '.join(names)}. Rename the file")
-    return with_controls(
-        entrants, {each.name: calibrated(each.camera, middle).light for each in entrants}, task.focus
-    )
+    lights = {each.name: calibrated(each.camera, middle).light for each in entrants}
+    return with_controls(entrants, lights, task.focus, task.curve)
 
 
-def _trial(task: Task, entrant: Entrant, name: str, functions: Mapping[str, FromFile | None], seeds: int) -> Trial:
+def _trial(
+    task: Task,
+    entrant: Entrant,
+    name: str,
+    content: str,
+    functions: Mapping[str, FromFile | None],
+    seeds: int,
+) -> Trial:
     rules = (
         VERSION,
         FORMAT_VERSION,
@@ -176,7 +185,7 @@ def _trial(task: Task, entrant: Entrant, name: str, functions: Mapping[str, From
         ELECTRONICS,
         seeds,
     )
-    known = (*rules, entrant.camera, entrant.time, scene(name).identity)
+    known = (*rules, entrant.camera, entrant.time, content)
     keys = tuple(
         fingerprint(*known, decoder if function is None else (function.function, function.digest))
         for decoder, function in functions.items()
@@ -336,7 +345,7 @@ class Store:
         import zarr
 
         group = zarr.open_group(self.path, mode="r+")
-        about = group.attrs[KEY]
+        about: Any = group.attrs[KEY]
         group.attrs[KEY] = {**about, "listed": {**about["listed"], task: list(dict.fromkeys(keys))}}
 
 
@@ -376,7 +385,8 @@ def results(path: str | PathLike[str], task: str) -> list[Scored]:
         with reading(folder / key, "a result of the zoo"):
             group = zarr.open_group(folder / str(key), mode="r")
             arrays = [np.asarray(group[name]) for name in ("scores", "picture", "recording", "truth")]
-            found.append(Scored(str(key), dict(group.attrs[KEY]), *arrays))
+            about: Any = group.attrs[KEY]
+            found.append(Scored(str(key), dict(about), *arrays))
     return found
 
 

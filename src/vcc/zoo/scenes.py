@@ -111,7 +111,7 @@ class Leaves:
 def leaves(seed: int) -> PlanesScene:
     """Four sheets of leaves: the nearest and the farthest distance of the rules, and two drawn between them."""
     random = np.random.default_rng([29, seed])
-    planes = []
+    planes: list[TexturedPlane] = []
     for blur in (-BLUR, *np.sort(random.uniform(-0.7 * BLUR, 0.7 * BLUR, 2)), BLUR):
         distance = distance_of(float(blur))
         width = 1.3 * max(PIXELS) * SLOPE * distance + SIDE
@@ -138,7 +138,7 @@ def identity(name: str) -> str:
     return f"files {digest.hexdigest()[:16]}, {VIEWS} views of {PIXELS}"
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)
 def scene(name: str) -> Scene:
     """A scene by name, "drawn" or "leaves-N" with a seed N, or by the path of a light field or of splats.
 
@@ -186,7 +186,7 @@ def _of_planes(name: str, planes: PlanesScene, cameras: CameraArray) -> Scene:
         blur = np.where(share > most, VIEWS * cameras.disparity(plane.distance), blur)
         most = np.maximum(most, share)
     values = np.asarray(made.values).mean(axis=-1)
-    return Scene(name, _declared(values, 0.0), _middle(blur, SHAPE))
+    return Scene(name, _declared(values, 0.0), _middle(blur[::-1, ::-1], SHAPE))  # s runs to the left
 
 
 def _of_splats(name: str, path: Path) -> Scene:

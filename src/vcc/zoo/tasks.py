@@ -23,7 +23,7 @@ from vcc.zoo.scenes import Scene
 
 Array = NDArray[np.float64]
 
-SIDEWAYS = 1.5
+LEAST_BLUR = 3.0
 """Blur of the farthest objects for the task depth, pixels: the focus lies beyond all objects."""
 BLOCK = 48
 """Side of the blocks of depth from defocus, pixels."""
@@ -68,6 +68,7 @@ class Task(Brief):
         focus: distance on which all cameras are focused, metres.
         blurs: of the points of the calibration, see `vcc.zoo.bench.distance_of`.
         entrants: the published cameras, without controls.
+        curve: light of further round stops, for the curve of what a stop alone reaches.
         decoders: by name.
         measures: of a decoded recording; the first one ranks. The time of the decoder is added to them.
         truth: of a scene.
@@ -80,6 +81,7 @@ class Task(Brief):
     focus: float
     blurs: tuple[float, ...]
     entrants: Callable[[float], list[Entrant]]
+    curve: tuple[float, ...]
     decoders: Mapping[str, Decoder]
     measures: tuple[Measure, ...]
     truth: Callable[[Scene], Array]
@@ -130,6 +132,7 @@ EDOF = Task(
     FOCUS,
     tuple(float(blur) for blur in np.linspace(BLUR, -BLUR, 7)),
     lambda focus: [*codes(focus), *plates(focus)],
+    (0.1, 0.04, 0.01),
     {
         "as recorded": decoders.as_recorded,
         "denoised": decoders.denoised,
@@ -155,7 +158,7 @@ def _distances(scene: Scene) -> Array:
 
 
 def _away(blur: Array) -> Array:
-    return np.vectorize(distance_of, otypes=[float])(blur)
+    return np.asarray(1 / (1 / FOCUS + blur * SLOPE / SIDE))
 
 
 def _blur(distance: Array) -> Array:
@@ -190,16 +193,17 @@ def by_defocus(recorded: Recorded, smoothed: bool = True) -> Array:
 
 
 def by_blocks(recorded: Recorded) -> Array:
-    """The same, each block by itself."""
+    """Return the same, each block alone."""
     return by_defocus(recorded, smoothed=False)
 
 
 DEPTH = Task(
     "depth",
     "Depth from one recording, focused beyond all objects",
-    distance_of(-BLUR - SIDEWAYS),
-    tuple(float(blur) for blur in np.arange(BLUR + 1, -BLUR - 1.01, -1.0)),
+    distance_of(-BLUR - LEAST_BLUR),
+    tuple(float(blur) for blur in np.arange(BLUR + 1, -BLUR - 0.01, -1.0)),
     codes,
+    (0.1,),
     {"defocus": by_defocus, "defocus, each block": by_blocks},
     (Measure("BadPix", "%", False, 1), Measure("MSE·100", "px²", False, 1), Measure("RMSE", "m", False, 3)),
     _distances,
