@@ -78,6 +78,8 @@ def test_means_and_errors_are_over_scenes_and_gains_are_paired(made):
     assert report.light("open, 40.8 % of the time") == pytest.approx(report.light(camera), abs=1e-3)
     row = next(row for row in report.rows(level) if row[0] == camera)
     assert row[1] == "40.8%"
+    # 9 views are too few for the open square's blur: the captures say so, and the table does.
+    assert any("leaves-3: ghosting" in remark for remark in report.remarks)
     assert row[-2] == gain.text(1, "+")
 
 

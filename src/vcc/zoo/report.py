@@ -145,7 +145,7 @@ class Report(Brief):
             lines = [rows[0], ["---"] * len(rows[0]), *rows[1:]]
             table = "\n".join(f"| {' | '.join(row)} |" for row in lines)
             parts.append(f"{name.capitalize()}: {electrons:g} electrons\n\n{table}")
-        return "\n\n".join(parts)
+        return "\n\n".join([*parts, *self.remarks])
 
     @property
     def summary(self) -> str:
@@ -159,6 +159,17 @@ class Report(Brief):
             "time. The last two columns are differences, positive if the camera is better, of the best decoders "
             "(bold): to a round stop, and to a shorter exposure of the open square, with the same light."
         )
+
+    @property
+    def remarks(self) -> list[str]:
+        """What differs from the rules, and the warnings of captures, each with the number of results."""
+        told: dict[str, int] = {}
+        for each in self.found:
+            scene = Path(str(each.about["scene"])).name
+            for words in (each.about["note"], *each.about["warnings"]):
+                if words:
+                    told[f"{scene}: {words}"] = told.get(f"{scene}: {words}", 0) + 1
+        return [f"{words} ({count} of {len(self.found)} results)" for words, count in told.items()]
 
     def table(self) -> Table:
         """One row for each camera, decoder, scene, light level and recording, with all measures."""

@@ -218,8 +218,8 @@ def scored(_: None, trial: Trial) -> list[Scored]:
     """
     task, made, entrant = TASKS[trial.task], scene(trial.scene), trial.entrant
     kernels, truth = calibrated(entrant.camera, task.blurs), task.truth(made)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResultWarning)  # rays beyond the views' borders are in the table
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ResultWarning)
         image = entrant.camera.capture(made.field, threads=1)
         if image.sampling_error:  # by rays
             image = entrant.camera.capture(made.field, samples=RAYS_PER_PIXEL, threads=1)
@@ -258,6 +258,7 @@ def scored(_: None, trial: Trial) -> list[Scored]:
             "missing_rays": round(float(image.missing_rays), 4),
             "sampling_error": sampling,
             "note": made.note,
+            "warnings": sorted({str(each.message) for each in caught}),
         }
         pictures = (task.shown(shown), recordings[SHOWN_LEVEL][0][0], task.shown(truth))
         found.append(Scored(key, about, scores, *(_grey(picture) for picture in pictures)))
