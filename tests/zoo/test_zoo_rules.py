@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ import vcc
 from tests import torchvision_declared
 from vcc.gallery.published_codes import LEVIN
 from vcc.patterns import Circle
+from vcc.store import save_store
 from vcc.units import mm
 from vcc.zoo import bench, scene
 from vcc.zoo.bench import BLUR, SHAPE, SIDE, SLOPE, Kernels, distance_of, exposed
@@ -97,6 +99,33 @@ def test_scenes_reach_the_stated_blur_and_their_depth_is_theirs():
         of = np.isclose(made.blur, blur)
         moved = {shift: np.abs(np.roll(right, shift, axis=1) - middle)[of].mean() for shift in range(-9, 10)}
         assert min(moved, key=moved.get) == expected
+
+
+def test_light_fields_of_the_user_keep_their_depth_and_say_what_differs(tmp_path):
+    """Two distances: blur through the square is disparity, from the middle of its range, times the views."""
+    near = np.zeros((130, 160), bool)
+    near[40:90, 50:110] = True
+    disparity = np.where(near, 1.5, -0.5).astype(np.float32)
+    random = np.random.default_rng(1).random((130, 160)).astype(np.float32)
+    views = np.stack(
+        [[np.where(np.roll(near, (-j, -i), (0, 1)), 1.0, random) for i in range(5)] for j in range(5)]
+    )
+    frame = vcc.LightField.from_views(views.astype(np.float32), 1 * mm, 1e-3).frame
+    field = vcc.LightField(views.astype(np.float32), frame, disparity=disparity)
+    save_store(field, tmp_path / "mine.zarr")
+    made = scene(str(tmp_path / "mine.zarr"))
+    # The range of the maps is centred: ±1 pixel from view to view, 5 of them.
+    assert sorted(np.unique(made.blur)) == pytest.approx([-5, 5])
+    assert np.array_equal(made.blur > 0, near[17:113, 16:144])
+    assert made.field.shape == (5, 5, 130, 160)
+    assert made.field.distance_of(1.5) == pytest.approx(distance_of(5.0))
+    assert made.field.distance_of(0.5) == pytest.approx(1.0)
+    assert "5 views across, 1 pixels apart" in made.note
+    save_store(vcc.LightField(views[:4, :4].astype(np.float32), frame), tmp_path / "even.zarr")
+    with pytest.raises(vcc.InputError, match="4×4 views"):
+        scene(str(tmp_path / "even.zarr"))
+    with pytest.raises(vcc.InputError, match="no map of depth"):
+        DEPTH.truth(replace(made, blur=None))
 
 
 def test_controls_have_the_light_of_their_cameras():

@@ -38,6 +38,8 @@ WIDE = 0.5
 """Field of view of views of splats, as a slope."""
 BUILT_IN = ("drawn", "leaves-1", "leaves-2")
 """Scenes of a run without ``--scene``."""
+ESTIMATED = "found "
+"""How the source of disparities begins that were estimated from the views: no ground truth."""
 SPLATS = (".spz", ".splat", ".ply", ".glb")
 
 
@@ -214,7 +216,10 @@ def _of_views(name: str, path: Path) -> Scene:
     nv, nu = field.shape[:2]
     if min(nv, nu) < 3 or nv % 2 == 0 or nu % 2 == 0:
         raise InputError(f"{name} has {nv}×{nu} views: the zoo takes odd numbers of 3 or more, for a middle view")
-    ends = field.measured_disparity_range()
+    maps = field.grid.disparities.maps()
+    views = [] if maps.source.startswith(ESTIMATED) else [tuple(map(int, view)) for view in maps.views]
+    exact = maps.values[views.index((nv // 2, nu // 2))] if (nv // 2, nu // 2) in views else None
+    ends = field.measured_disparity_range() if exact is None else (float(exact.min()), float(exact.max()))
     if ends is None or ends[0] == ends[1]:
         raise InputError(f"{name} shows no parallax: there is no blur to remove")
     bins = max(1, round(nu * (ends[1] - ends[0]) / 2 / BLUR))
@@ -231,12 +236,10 @@ def _of_views(name: str, path: Path) -> Scene:
     if not white > 0:
         raise InputError(f"{name} is dark in its middle view")
     middle = (ends[0] + ends[1]) / 2
-    maps = field.grid.disparities.maps()
-    views = [tuple(int(n) for n in view) for view in maps.views] if maps is not None else []
     blur = None
-    if (nv // 2, nu // 2) in views:
-        exact = maps.values[views.index((nv // 2, nu // 2))][: rows * bins : bins, : columns * bins : bins]
-        blur = _middle(nu * (exact - middle) / bins, SHAPE)
+    if exact is not None:
+        one_of_each = exact[: rows * bins : bins, : columns * bins : bins]
+        blur = _middle(nu * (one_of_each - middle) / bins, SHAPE)
     reached = nu * (ends[1] - ends[0]) / 2 / bins
     note = f"{nu} views across, {(ends[1] - ends[0]) / 2 / bins:.2g} pixels apart at the ends; blur {reached:.3g}"
     return Scene(name, _declared(np.minimum(values / white, 1), middle / bins), blur, note)
