@@ -140,5 +140,11 @@ def test_a_camera_of_the_user_takes_part_with_its_control(tmp_path):
     assert report.light("mine") == pytest.approx(43 / 169, abs=1e-4)
     group = zarr.open_group(tmp_path / "z.zarr" / report.found[0].key, mode="r")
     assert group["scores"].shape == (3, 1, 3)
+    # The same camera by another name is another entrant; the name of a control is taken.
+    mine.rename(tmp_path / "again.toml")
+    run("edof", tmp_path / "z.zarr", cameras=[tmp_path / "again.toml"], **few)
+    assert "again" in Report.of(tmp_path / "z.zarr", "edof").names("camera")
     open_square(1.0).save(tmp_path / "open.toml")
     assert running.loaded(tmp_path / "open.toml") == open_square(1.0)
+    with pytest.raises(vcc.InputError, match="two cameras have one name"):
+        run("edof", tmp_path / "z.zarr", cameras=[tmp_path / "open.toml"], **few)

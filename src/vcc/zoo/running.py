@@ -160,11 +160,12 @@ def _entrants(task: Task, cameras: Sequence[Path]) -> list[Entrant]:
     middle = (task.blurs[len(task.blurs) // 2],)
     entrants = task.entrants(task.focus)
     entrants += [Entrant(path.stem, loaded(path), source=str(path)) for path in cameras]
-    names = [each.name for each in entrants]
-    if len(set(names)) < len(names):
-        raise InputError(f"two cameras have one name: {', '.join(names)}. Rename the file")
     lights = {each.name: calibrated(each.camera, middle).light for each in entrants}
-    return with_controls(entrants, lights, task.focus, task.curve)
+    listed = with_controls(entrants, lights, task.focus, task.curve)
+    names = [each.name for each in listed]
+    if len(set(names)) < len(names):
+        raise InputError(f"two cameras have one name, out of {', '.join(names)}: rename the file")
+    return listed
 
 
 def _trial(
@@ -185,9 +186,9 @@ def _trial(
         ELECTRONICS,
         seeds,
     )
-    known = (*rules, entrant.camera, entrant.time, content)
+    known = (*rules, entrant.name, entrant.control, entrant.camera, entrant.time, name, content)
     keys = tuple(
-        fingerprint(*known, decoder if function is None else (function.function, function.digest))
+        fingerprint(*known, decoder, () if function is None else (function.function, function.digest))
         for decoder, function in functions.items()
     )
     return Trial(task.name, entrant, name, functions, keys, seeds)
@@ -389,6 +390,3 @@ def results(path: str | PathLike[str], task: str) -> list[Scored]:
             about: Any = group.attrs[KEY]
             found.append(Scored(str(key), dict(about), *arrays))
     return found
-
-
-__all__ = ["Scored", "results", "run"]
