@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import lru_cache
 from os import PathLike
@@ -147,11 +149,12 @@ def run(
         listed = [key for trial in trials for key in trial.keys]
         done, total, made = sum(key in kept for key in listed), len(listed), 0
         todo = [_lacking(trial, kept) for trial in trials if not kept.issuperset(trial.keys)]
-        for results in _performed(todo, executor):
-            for result in results:
-                store.put(result)
-            made += len(results)
-            tell(progress, done + made, total)
+        with _hearing():
+            for results in _performed(todo, executor):
+                for result in results:
+                    store.put(result)
+                made += len(results)
+                tell(progress, done + made, total)
         store.list(task, listed)
     return made
 
@@ -205,13 +208,40 @@ def _lacking(trial: Trial, kept: set[str]) -> Trial:
 def _performed(trials: Sequence[Trial], executor: Any) -> Iterator[list[Scored]]:
     if executor is None:
         for trial in trials:
-            yield scored(None, trial)
+            yield _scored(trial)
     elif trials:
-        for _, results in worker_pool(executor).each(Work(scored, None), trials):
+        for _, results in worker_pool(executor).each(Work(scored, os.getpid()), trials):
             yield results
 
 
-def scored(_: None, trial: Trial) -> list[Scored]:
+_heard = threading.local()
+"""The warnings about results in this thread: its `words`."""
+
+
+@contextmanager
+def _hearing() -> Iterator[None]:
+    """Collect warnings about results by thread: filters of warnings are those of the whole process."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, ResultWarning):
+                _heard.__dict__.setdefault("words", []).append(str(message))
+            else:
+                shown(message, category, *place, **more)
+
+        warnings.simplefilter("always", ResultWarning)
+        warnings.showwarning = hear  # restored by catch_warnings
+        yield
+
+
+def scored(asking: int, trial: Trial) -> list[Scored]:
+    """The results of a trial, as a task; ``asking`` is the process that hears the warnings of its threads."""
+    with nullcontext() if os.getpid() == asking else _hearing():
+        return _scored(trial)
+
+
+def _scored(trial: Trial) -> list[Scored]:
     """The results of a trial.
 
     Raises:
@@ -219,11 +249,11 @@ def scored(_: None, trial: Trial) -> list[Scored]:
     """
     task, made, entrant = TASKS[trial.task], scene(trial.scene), trial.entrant
     kernels, truth = calibrated(entrant.camera, task.blurs), task.truth(made)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", ResultWarning)
-        image = entrant.camera.capture(made.field, threads=1)
-        if image.sampling_error:  # by rays
-            image = entrant.camera.capture(made.field, samples=RAYS_PER_PIXEL, threads=1)
+    _heard.words = []
+    image = entrant.camera.capture(made.field, threads=1)
+    if image.sampling_error:  # by rays
+        image = entrant.camera.capture(made.field, samples=RAYS_PER_PIXEL, threads=1)
+    told, _heard.words = sorted(set(_heard.words)), []  # warnings of decoders, of single recordings, are dropped
     light = kernels.light * entrant.time
     white = kernels.light * (SIDE * SLOPE / entrant.camera.sensor.pitches[1]) ** 2  # irradiance
     sampling = float(image.sampling_error or 0.0) / white
@@ -259,7 +289,7 @@ def scored(_: None, trial: Trial) -> list[Scored]:
             "missing_rays": round(float(image.missing_rays), 4),
             "sampling_error": sampling,
             "note": made.note,
-            "warnings": sorted({str(each.message) for each in caught}),
+            "warnings": told,
         }
         pictures = (task.shown(shown), recordings[SHOWN_LEVEL][0][0], task.shown(truth))
         found.append(Scored(key, about, scores, *(_grey(picture) for picture in pictures)))
@@ -268,9 +298,7 @@ def scored(_: None, trial: Trial) -> list[Scored]:
 
 def _decoded(decode: Decoder, name: str, recorded: Recorded) -> Any:
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResultWarning)  # of single recordings, among hundreds
-            return decode(recorded)
+        return decode(recorded)
     except InputError:
         raise
     except Exception as error:
