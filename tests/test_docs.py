@@ -84,7 +84,7 @@ def test_own_element_makes_rings_of_its_closed_form():
     assert abs(image[radius < inner - margin]).max() < 6e-5 * image.max()  # of a Gaussian beyond 4 σ
 
 
-WITHOUT = ("vcc.cli", "vcc.engines", "vcc.plan", "vcc.__main__", "vcc.run.torch_physics")
+WITHOUT = ("vcc.cli", "vcc.engines", "vcc.plan", "vcc.__main__", "vcc.run.torch_physics", "vcc.zoo.torch_denoiser")
 """What has no public names; the last needs deepinv, which does not load beside every build of PyTorch."""
 
 

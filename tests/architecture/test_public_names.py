@@ -43,6 +43,7 @@ NAMES = {
     "vcc.surfaces": "Axicon Cubic HeightMap PathMap Quadratic Rough Tilt Zernike",
     "vcc.torch": "CameraModule binary expose levels raw_of sigmoid_mask total_light",
     "vcc.units": "cm deg m mm mrad ms nm rad s um us",
+    "vcc.zoo": "TASKS Decoder Recorded Report Scene Task run scene",
 }
 
 

@@ -97,7 +97,7 @@ def test_every_element_fits_a_line_of_a_wide_terminal():
     assert "rotation 12.3457°" in elements[6].described()
 
 
-NEEDS_DEEPINV = "vcc.run.torch_physics"
+NEEDS_DEEPINV = ("vcc.run.torch_physics", "vcc.zoo.torch_denoiser")
 """A class of deepinv's, which does not load beside every build of PyTorch (see tests/run/test_deepinv.py)."""
 NEEDS_GPU = "vcc.engines.cuda"
 """It is refused where there is none, and holds functions alone."""
@@ -106,7 +106,7 @@ NEEDS_GPU = "vcc.engines.cuda"
 def dataclasses_with_arrays():
     """Each dataclass of the package whose fields name arrays in their types."""
     for module in pkgutil.walk_packages(vcc.__path__, "vcc."):
-        others = ("vcc.cli", "vcc.gallery", "vcc.demo", NEEDS_DEEPINV)
+        others = ("vcc.cli", "vcc.gallery", "vcc.demo", *NEEDS_DEEPINV)
         if module.name == NEEDS_GPU or module.name.endswith("__main__") or module.name.startswith(others):
             continue
         for each in vars(importlib.import_module(module.name)).values():

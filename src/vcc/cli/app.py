@@ -166,6 +166,27 @@ RENDERERS = {
 }
 """Likewise: ``vcc synth NAME`` is the function NAME in ``vcc.cli.synth.NAME``."""
 
+ZOO = {
+    "run": (
+        "Score cameras, scenes and decoders for a task, with controls of the same light.\n\n"
+        "Results are kept by content: the same command resumes an interrupted run, and a new camera or decoder "
+        "adds only its own results.",
+        "vcc zoo run --task edof -o zoo.zarr",
+        "vcc zoo run --task edof -o zoo.zarr --camera my.toml --decoder my.py:decode",
+        "vcc zoo run --task depth -o zoo.zarr --scene leaves-7 --scene views.zarr --executor processes",
+    ),
+    "table": (
+        "Print the table of a run, with standard errors over scenes and the gains over controls.",
+        "vcc zoo table zoo.zarr",
+        "vcc zoo table zoo.zarr --task depth -o scores.csv",
+    ),
+    "page": (
+        "Write a page of a run: tables, quality over light, and a strip of pictures.",
+        "vcc zoo page zoo.zarr -o page",
+    ),
+}
+"""Likewise: ``vcc zoo NAME`` is the function NAME in ``vcc.cli.zoo.NAME``."""
+
 
 def _commands(
     name: str, package: str, commands: dict[str, tuple[str, ...]], help: str, epilogue: str, place: int = 0
@@ -220,6 +241,17 @@ app.command(
         'views = [9, 9] and aperture = "20 mm". Options next to it have precedence.',
         "Help on a renderer:  vcc synth planes --help",
         place=len(COMMANDS),
+    )
+)
+app.command(
+    _commands(
+        "zoo",
+        "vcc.cli.zoo",
+        ZOO,
+        "Compare computational cameras by common rules: the same scenes, exposures, noise and decoders, and "
+        "controls of the same light. A camera and a decoder of yours can take part.",
+        "Help on a command:  vcc zoo run --help",
+        place=len(COMMANDS) + 1,
     )
 )
 app.register_install_completion_command(

@@ -1,0 +1,1 @@
+"""``vcc zoo``: computational cameras compared by common rules."""

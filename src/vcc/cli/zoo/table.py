@@ -1,0 +1,32 @@
+"""``vcc zoo table``: the table of a run."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from vcc.cli.console import check_output, show
+from vcc.sweeps.table import ENDINGS
+from vcc.zoo import Report
+
+
+def table(
+    store: Annotated[Path, Parameter(metavar="STORE")],
+    /,
+    *,
+    task: str = "edof",
+    output: Annotated[Path | None, Parameter(alias="-o", metavar="FILE")] = None,
+) -> None:
+    """Print the table of a run as Markdown, with standard errors and the gains over controls.
+
+    Args:
+        task: Of the run.
+        output: Write all scores here instead, .csv or .parquet: a row for each recording.
+    """
+    report = Report.of(store, task)
+    if output is None:
+        show(report.markdown())
+        return
+    path, rows = check_output(output, ENDINGS), report.table()
+    rows.save(path)
+    show(f"{path}: {len(rows)} rows of {len(rows.columns)} columns")

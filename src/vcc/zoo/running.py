@@ -1,0 +1,420 @@
+"""A run of the zoo: trials of cameras, scenes and decoders, kept by content in a Zarr group."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import lru_cache
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError, ResultWarning
+from vcc.base.progress import Progress, tell
+from vcc.base.reading import check_path, expanded, read_bytes, read_json, reading, value_at
+from vcc.base.values import fingerprint
+from vcc.base.version import VERSION
+from vcc.camera import Camera
+from vcc.files.atomic import refusal
+from vcc.files.parts import check_name, clear_folder, part_of
+from vcc.files.writer_lock import WriterLock
+from vcc.run.executors import Work, worker_pool
+from vcc.zoo.bench import ELECTRONICS, LEVELS, SIDE, SLOPE, Kernels, exposed
+from vcc.zoo.decoders import Decoder, Recorded
+from vcc.zoo.entrants import Entrant, FromFile, loaded, with_controls
+from vcc.zoo.scenes import BUILT_IN, identity, scene
+from vcc.zoo.tasks import TASKS, Task, task_named
+
+Array = NDArray[np.float64]
+
+KEY = "zoo"
+FORMAT_VERSION = 1
+RAYS_PER_PIXEL = 1024
+"""For cameras with plates; others use footprints, without noise of sampling."""
+SHOWN_LEVEL = 1
+"""The light level of pictures in strips: dim."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trial(Brief):
+    """A camera, a scene and some decoders.
+
+    Args:
+        task: its name.
+        entrant: the camera.
+        scene: its name.
+        decoders: names, and functions of the user; None for the task's own.
+        keys: of the results, one for each decoder.
+        seeds: of the noise.
+    """
+
+    task: str
+    entrant: Entrant
+    scene: str
+    decoders: Mapping[str, FromFile | None]
+    keys: tuple[str, ...]
+    seeds: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Scored(Brief):
+    """The result of one camera, scene and decoder.
+
+    Args:
+        key: fingerprint of all that it depends on.
+        about: names, light, control and so on, as JSON.
+        scores: (levels, seeds, measures).
+        picture: what the decoder made of the first seed at `SHOWN_LEVEL`, grey, uint8 of sRGB.
+        recording: the recording that it was made of, likewise.
+        truth: likewise.
+    """
+
+    key: str
+    about: Mapping[str, Any]
+    scores: Array
+    picture: NDArray[np.uint8]
+    recording: NDArray[np.uint8]
+    truth: NDArray[np.uint8]
+
+
+@lru_cache(maxsize=64)
+def calibrated(camera: Camera, blurs: tuple[float, ...]) -> Kernels:
+    """The kernels of a camera."""
+    return Kernels.of(camera, np.array(blurs))
+
+
+def run(
+    task: str,
+    output: str | PathLike[str],
+    *,
+    scenes: Sequence[str] = BUILT_IN,
+    seeds: int = 2,
+    cameras: Sequence[Path] = (),
+    own_decoders: Sequence[str] = (),
+    without: Sequence[str] = (),
+    executor: Any = None,
+    progress: Progress | None = None,
+) -> int:
+    """Score cameras, scenes and decoders, except those whose results the store has already.
+
+    Args:
+        task: "edof" or "depth".
+        output: folder of the store, a Zarr group; created, or continued.
+        scenes: names of scenes, or paths of light fields and splats (`vcc.zoo.scenes.scene`).
+        seeds: number of recordings of each scene at each light level.
+        cameras: further camera files, each with all decoders.
+        own_decoders: further decoders, "my.py:decode", each with all cameras.
+        without: names of decoders or cameras to leave out.
+        executor: runs the trials: a `concurrent.futures.Executor` or a ``dask.distributed.Client``; each worker
+            makes the scenes itself, and reads files by the same paths. None uses this process.
+        progress: called with (done, total) in results.
+
+    Returns:
+        The number of results that were computed; the others were in the store.
+
+    Raises:
+        InputError: unknown task or scene; a camera or decoder that does not fit; an output that is something
+            else; an error of the disk. Results that were finished are kept.
+    """
+    chosen = task_named(task)
+    if seeds < 1:
+        raise InputError(f"--seeds is {seeds}: one recording or more")
+    entrants = _entrants(chosen, cameras)
+    functions: dict[str, FromFile | None] = dict.fromkeys(chosen.decoders)
+    functions |= {f"{Path(each.path).stem}:{each.function}": each for each in map(FromFile.of, own_decoders)}
+    names = {each.name for each in entrants} | set(functions)
+    for name in without:
+        if name not in names:
+            raise InputError(f"--without {name}: the task {task} has {', '.join(sorted(names))}")
+    entrants = [each for each in entrants if each.name not in without]
+    functions = {name: function for name, function in functions.items() if name not in without}
+    contents = {name: identity(name) for name in scenes}
+    trials = [
+        _trial(chosen, each, name, content, functions, seeds)
+        for name, content in contents.items()
+        for each in entrants
+    ]
+    with Store(output) as store:
+        kept = store.keys()
+        listed = [key for trial in trials for key in trial.keys]
+        done, total, made = sum(key in kept for key in listed), len(listed), 0
+        todo = [_lacking(trial, kept) for trial in trials if not kept.issuperset(trial.keys)]
+        with _hearing():
+            for results in _performed(todo, executor):
+                for result in results:
+                    store.put(result)
+                made += len(results)
+                tell(progress, done + made, total)
+        store.list(task, listed)
+    return made
+
+
+def _entrants(task: Task, cameras: Sequence[Path]) -> list[Entrant]:
+    middle = (task.blurs[len(task.blurs) // 2],)
+    entrants = task.entrants(task.focus)
+    entrants += [Entrant(path.stem, loaded(path), source=str(path)) for path in cameras]
+    lights = {each.name: calibrated(each.camera, middle).light for each in entrants}
+    listed = with_controls(entrants, lights, task.focus, task.curve)
+    names = [each.name for each in listed]
+    if len(set(names)) < len(names):
+        raise InputError(f"two cameras have one name, out of {', '.join(names)}: rename the file")
+    return listed
+
+
+def _trial(
+    task: Task,
+    entrant: Entrant,
+    name: str,
+    content: str,
+    functions: Mapping[str, FromFile | None],
+    seeds: int,
+) -> Trial:
+    rules = (
+        VERSION,
+        FORMAT_VERSION,
+        task.name,
+        task.focus,
+        task.blurs,
+        tuple(LEVELS.values()),
+        ELECTRONICS,
+        seeds,
+    )
+    known = (*rules, entrant.name, entrant.control, entrant.camera, entrant.time, name, content)
+    keys = tuple(
+        fingerprint(*known, decoder, () if function is None else (function.function, function.digest))
+        for decoder, function in functions.items()
+    )
+    return Trial(task.name, entrant, name, functions, keys, seeds)
+
+
+def _lacking(trial: Trial, kept: set[str]) -> Trial:
+    """The trial with the decoders whose results are missing."""
+    pairs = [(name, key) for name, key in zip(trial.decoders, trial.keys, strict=True) if key not in kept]
+    functions = {name: trial.decoders[name] for name, _ in pairs}
+    keys = tuple(key for _, key in pairs)
+    return Trial(trial.task, trial.entrant, trial.scene, functions, keys, trial.seeds)
+
+
+def _performed(trials: Sequence[Trial], executor: Any) -> Iterator[list[Scored]]:
+    if executor is None:
+        for trial in trials:
+            yield _scored(trial)
+    elif trials:
+        for _, results in worker_pool(executor).each(Work(scored, os.getpid()), trials):
+            yield results
+
+
+_heard = threading.local()
+"""The warnings about results in this thread: its `words`."""
+
+
+@contextmanager
+def _hearing() -> Iterator[None]:
+    """Collect warnings about results by thread: filters of warnings are those of the whole process."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+            if issubclass(category, ResultWarning):
+                _heard.__dict__.setdefault("words", []).append(str(message))
+            else:
+                shown(message, category, *place, **more)
+
+        warnings.simplefilter("always", ResultWarning)
+        warnings.showwarning = hear  # restored by catch_warnings
+        yield
+
+
+def scored(asking: int, trial: Trial) -> list[Scored]:
+    """The results of a trial, as a task; ``asking`` is the process that hears the warnings of its threads."""
+    with nullcontext() if os.getpid() == asking else _hearing():
+        return _scored(trial)
+
+
+def _scored(trial: Trial) -> list[Scored]:
+    """The results of a trial.
+
+    Raises:
+        InputError: a decoder that fails, or returns something else than its task takes.
+    """
+    task, made, entrant = TASKS[trial.task], scene(trial.scene), trial.entrant
+    kernels, truth = calibrated(entrant.camera, task.blurs), task.truth(made)
+    _heard.words = []
+    image = entrant.camera.capture(made.field, threads=1)
+    if image.sampling_error:  # by rays
+        image = entrant.camera.capture(made.field, samples=RAYS_PER_PIXEL, threads=1)
+    told, _heard.words = sorted(set(_heard.words)), []  # warnings of decoders, of single recordings, are dropped
+    light = kernels.light * entrant.time
+    white = kernels.light * (SIDE * SLOPE / entrant.camera.sensor.pitches[1]) ** 2  # irradiance
+    sampling = float(image.sampling_error or 0.0) / white
+    recordings = [
+        [
+            exposed(entrant.camera, image, electrons * entrant.time, kernels.light, seed)
+            for seed in range(trial.seeds)
+        ]
+        for electrons in LEVELS.values()
+    ]
+    found = []
+    for (name, function), key in zip(trial.decoders.items(), trial.keys, strict=True):
+        decode: Decoder = task.decoders[name] if function is None else function.load()
+        scores = np.empty((len(LEVELS), trial.seeds, len(task.all_measures)))
+        shown = truth
+        for level, row in enumerate(recordings):
+            for seed, (values, noise) in enumerate(row):
+                begun = time.perf_counter()
+                recorded = Recorded(values, math.hypot(noise, sampling), kernels, entrant.camera)
+                decoded = task.checked(_decoded(decode, name, recorded), name)
+                taken = time.perf_counter() - begun
+                scores[level, seed] = (*task.scored(decoded, truth), taken)
+                if (level, seed) == (SHOWN_LEVEL, 0):
+                    shown = decoded
+        about = {
+            "task": task.name,
+            "camera": entrant.name,
+            "decoder": name,
+            "scene": trial.scene,
+            "control": entrant.control,
+            "light": round(light, 6),
+            "source": entrant.source,
+            "missing_rays": round(float(image.missing_rays), 4),
+            "sampling_error": sampling,
+            "note": made.note,
+            "warnings": told,
+        }
+        pictures = (task.shown(shown), recordings[SHOWN_LEVEL][0][0], task.shown(truth))
+        found.append(Scored(key, about, scores, *(_grey(picture) for picture in pictures)))
+    return found
+
+
+def _decoded(decode: Decoder, name: str, recorded: Recorded) -> Any:
+    try:
+        return decode(recorded)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"the decoder {name} fails: {type(error).__name__}: {error}") from error
+
+
+def _grey(picture: Array) -> NDArray[np.uint8]:
+    """8 bits, of gamma 2.2."""
+    return np.rint(255 * np.clip(picture, 0, 1) ** (1 / 2.2)).astype(np.uint8)
+
+
+class Store:
+    """Results in a Zarr group, each in a group of its own, named by its key; it appears complete or not at all.
+
+    Args:
+        path: the folder.
+
+    Raises:
+        InputError: the path is something else, another process writes it, or the disk reports an error.
+    """
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.path = expanded(path)
+        check_name(self.path)
+        if not self.path.parent.is_dir():
+            raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
+        if os.path.lexists(self.path):
+            stated(self.path)
+        self._lock = WriterLock(self.path)
+
+    def __enter__(self) -> Store:
+        import zarr
+
+        try:
+            if not self.path.exists():
+                attributes = {KEY: {"format_version": FORMAT_VERSION, "listed": {}}}
+                zarr.create_group(self.path, zarr_format=3, attributes=attributes)
+            clear_folder(self.path, self._lock.patience)
+        except BaseException:
+            self._lock.give_back()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lock.give_back()
+
+    def keys(self) -> set[str]:
+        """The keys of all results in the store."""
+        return {
+            each.name for each in self.path.iterdir() if (each / "zarr.json").is_file() and each.name[0] != "."
+        }
+
+    def put(self, result: Scored) -> None:
+        """Write a result.
+
+        Raises:
+            InputError: the disk reports an error.
+        """
+        import zarr
+
+        target = self.path / result.key
+        part = part_of(target)
+        try:
+            group = zarr.create_group(part, zarr_format=3, attributes={KEY: dict(result.about)})
+            for name in ("scores", "picture", "recording", "truth"):
+                group.create_array(name, data=getattr(result, name))
+            if not target.exists():  # two equal cameras have one result
+                part.rename(target)
+        except OSError as error:
+            raise InputError(f"{target} could not be written: {refusal(error, part)}") from error
+
+    def list(self, task: str, keys: Sequence[str]) -> None:
+        """State which results belong to the latest run of a task."""
+        import zarr
+
+        group = zarr.open_group(self.path, mode="r+")
+        about: Any = group.attrs[KEY]
+        group.attrs[KEY] = {**about, "listed": {**about["listed"], task: list(dict.fromkeys(keys))}}
+
+
+def stated(path: Path) -> dict[str, Any]:
+    """The attributes of a store of the zoo.
+
+    Raises:
+        InputError: it is something else, or newer than this version supports.
+    """
+    check_path(path, "store of the zoo")
+    if not (path / "zarr.json").is_file():
+        raise InputError(f"{path} is no store of the zoo")
+    found = value_at(read_json(read_bytes(path / "zarr.json"), str(path)), "attributes", KEY)
+    if not isinstance(found, dict) or not isinstance(found.get("listed"), dict):
+        raise InputError(f"{path} is no store of the zoo")
+    if found.get("format_version") != FORMAT_VERSION:
+        raise InputError(
+            f"{path} has format_version {found.get('format_version')}: use another vcc, or a new store"
+        )
+    return found
+
+
+def results(path: str | PathLike[str], task: str) -> list[Scored]:
+    """The results of the latest run of a task.
+
+    Raises:
+        InputError: no store, no run of this task, or a damaged result.
+    """
+    import zarr
+
+    folder = expanded(path)
+    listed = stated(folder)["listed"].get(task)
+    if not listed:
+        raise InputError(f"{folder} has no finished run of the task {task}: vcc zoo run --task {task} -o {folder}")
+    found = []
+    for key in listed:
+        with reading(folder / key, "a result of the zoo"):
+            group = zarr.open_group(folder / str(key), mode="r")
+            arrays = [np.asarray(group[name]) for name in ("scores", "picture", "recording", "truth")]
+            about: Any = group.attrs[KEY]
+            found.append(Scored(str(key), dict(about), *arrays))
+    return found
