@@ -236,8 +236,8 @@ def _why_no_rays(core: Rays, rays: int) -> str:
 def _why_no_footprints(plan: Plan, core: Any) -> str | None:
     """None if masks close the camera, so that no light is expected."""
     assert isinstance(core, Footprints)
-    on = next((operator for operator in plan.after if isinstance(operator, OnSensor)), OnSensor(0))
-    open_sensor = on.transmission is None or on.transmission.any()
+    on = [operator for operator in plan.after if isinstance(operator, OnSensor)]
+    open_sensor = all(each.transmission is None or each.transmission.any() for each in on)
     if not all(mask.texture.any() for mask in core.masks) or not open_sensor:
         return None
     if not core.weights.any():
@@ -247,7 +247,7 @@ def _why_no_footprints(plan: Plan, core: Any) -> str | None:
     used = core.weights > 0
     ends = []
     for places, step in ((core.x, core.step[0]), (core.y, core.step[1])):
-        on_sensor = places[used][:, None] - on.guard + corners @ step
+        on_sensor = places[used][:, None] - sum(each.guard for each in on) + corners @ step
         ends += [round(float(on_sensor.min())), round(float(on_sensor.max()))]
     rows, columns = plan.sensor_shape
     return (

@@ -22,7 +22,9 @@ from vcc.plan.footprints.mixtures import Mixture
 from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
 from vcc.plan.model import InFocus, MadeFor, Plan
+from vcc.plan.operators import OnSensor
 from vcc.plan.rays.compile import ByRays, RayChoices
+from vcc.plan.stop_diffraction import StopDiffraction
 
 
 def compile_best(train: Train, grid: Grid, how: How | None = None, parts: Parts = NONE_KEPT) -> Plan:
@@ -147,6 +149,12 @@ class _Making:
                 "column)"
             )
         refuse(train, "one plan for all channels")
+        if how.diffraction and follow is not None:
+            raise InputError(
+                "diffraction=True is not for plans that follow a camera while it learns: the stop's diffraction has no "
+                "derivative to its parameters here. For gradients to the samples, capture a light field of tensors "
+                "or use camera.operator(light_field, diffraction=True)"
+            )
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts
 
@@ -257,7 +265,13 @@ class _Making:
 
     @property
     def plan(self) -> Plan:
-        """The plan of the image."""
+        """The plan of the image.
+
+        Raises:
+            InputError: options that do not go together, or a camera whose stop's diffraction is not known.
+        """
+        if self.how.diffraction:
+            return self._diffracted
         plan = self.by.plan
         if self.how.between_views != "depth":
             return plan
@@ -271,6 +285,16 @@ class _Making:
             why += f"; {share.mean():.0%} of the picture is in focus, and made of the views as they are"
         cautions = (*plan.cautions, *between.cautions())
         return replace(plan, views_between=between, in_focus=focused, notes=(*plan.notes, why), cautions=cautions)
+
+    @property
+    def _diffracted(self) -> Plan:
+        """The plan of the image on a larger sensor, which is then convolved and cut."""
+        added = StopDiffraction.of(self.train, self.grid)
+        how = replace(self.how, diffraction=False)
+        plan = _Making(added.widened, self.grid, how, parts=self.parts).plan
+        after = (*plan.after, added.operator, OnSensor(added.half_width))
+        shape = self.train.sensor.shape
+        return replace(plan, sensor_shape=shape, after=after, notes=(*plan.notes, *added.notes))
 
     @property
     def known(self) -> Plan:
@@ -349,5 +373,5 @@ def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
 
 def _codes(trains: Sequence[Train], how: How) -> Codes | None:
     """The common description of trains if they differ in the cells of one mask, and footprints make the images."""
-    alone = how.method == "rays" or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
+    alone = how.method == "rays" or how.diffraction or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
     return None if alone or len(trains) < 2 else Codes.of(trains)

@@ -42,6 +42,7 @@ class Options(TypedDict, total=False):
     engine: EngineName | None
     threads: int | None
     memory_limit: int | None
+    diffraction: bool
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,6 +80,8 @@ class How(Value, Shown):
         memory_limit: for a stored light field, bytes for its pieces, the image and the engine together; None
             takes a quarter of `vcc.base.memory.MEMORY_LIMIT`, 1 GiB. Smaller pieces take more time with rays,
             because all rays are traced for each piece.
+        diffraction: convolve the image of each band with the spread of a point in focus by the camera's stop, by
+            waves; needs a light field with wavelengths. See "Waves" in the docs for its error out of focus.
 
     Raises:
         InputError: an unsupported value, named together with the supported ones.
@@ -95,6 +98,7 @@ class How(Value, Shown):
     engine: EngineName | None = None
     threads: int | None = None
     memory_limit: int | None = None
+    diffraction: bool = False
 
     def __post_init__(self) -> None:
         checks.one_of("method", self.method, get_args(Method))
@@ -120,6 +124,13 @@ class How(Value, Shown):
             checks.one_of("engine", self.engine, get_args(EngineName))
         if self.threads is not None:
             checks.whole_number_between("threads", self.threads, 1)
+        if not isinstance(self.diffraction, bool):  # type: ignore[redundant-expr]
+            raise InputError(f"diffraction is True or False, not {self.diffraction!r}")
+        if self.diffraction and self.between_views == "depth":
+            raise InputError(
+                "diffraction=True and between_views='depth' do not go together: the image is then a mixture of two, "
+                "and not one that can be convolved. Leave one of them out"
+            )
         if self.memory_limit is not None:
             checks.above_zero("memory_limit", self.memory_limit, "a number of bytes", infinite=True)
 

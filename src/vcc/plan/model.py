@@ -22,7 +22,7 @@ from vcc.base.values import Value
 from vcc.fields.grid import Block, Grid
 from vcc.optics.train import Train
 from vcc.plan.depth_rule import ViewsBetween
-from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurViews, DarkBorder
+from vcc.plan.operators import After, AlongAxes, Before, Blur, BlurByChannel, BlurViews, DarkBorder
 from vcc.plan.parameters import parameters, with_parameters
 from vcc.plan.protocol import Core
 
@@ -213,7 +213,7 @@ class Plan(Value, Shown):
             match operator:
                 case BlurViews(kernel):
                     found.append(f"views blurred by a kernel of {kernel.shape[0]}×{kernel.shape[1]} samples")
-                case Blur(kernel, words):
+                case Blur(kernel, words) | BlurByChannel(kernel, words):
                     found.append(f"{words}: a kernel of {kernel.shape[0]}×{kernel.shape[1]} pixels")
                 case AlongAxes(down, across, words):
                     found.append(f"{words}: {len(down)}×{len(across)} pixels")

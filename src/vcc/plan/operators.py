@@ -9,7 +9,7 @@ derivative of ⟨apply(a), b⟩ to the operator's own parameters.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -479,6 +479,41 @@ class Blur(Brief, Value):
         # regions.
         wide = oaconvolve(raster.astype(np.float64), kernel[:, :, None], mode="same", axes=(0, 1))
         return without_rounding(wide)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BlurByChannel(Brief, Value):
+    """Each channel of the raster convolved with a kernel of its own, dark beyond its border.
+
+    Args:
+        kernel: in pixels, odd rows × odd columns × channels.
+        words: purpose.
+    """
+
+    kernel: Array
+    words: str
+
+    def apply(self, raster: Any) -> Any:
+        """The raster (rows, columns, channels) convolved, of the same size."""
+        return self._each(raster, lambda one, blur: blur.apply(one))
+
+    def transpose(self, raster: Any) -> Any:
+        """Convolved with the kernels rotated by 180°."""
+        return self._each(raster, lambda one, blur: blur.transpose(one))
+
+    def pull(self, raster: Any, weights: Any, wanted: Collection[str]) -> dict[str, Array]:
+        """The derivative to the kernels."""
+        if "kernel" not in wanted:
+            return {}
+        lags = [_lags(length) for length in self.kernel.shape[:2]]
+        each = range(self.kernel.shape[2])
+        return {"kernel": np.stack([correlated(weights[..., n : n + 1], raster[..., n : n + 1], *lags) for n in each], -1)}
+
+    def _each(self, raster: Any, verb: Callable[[Any, Blur], Any]) -> Any:
+        made = [
+            verb(raster[..., n : n + 1], Blur(self.kernel[..., n], self.words)) for n in range(self.kernel.shape[2])
+        ]
+        return np.concatenate(made, -1) if isinstance(raster, np.ndarray) else array_namespace(raster).concat(made, axis=-1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

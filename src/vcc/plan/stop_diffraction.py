@@ -1,0 +1,148 @@
+"""The stop's diffraction: one convolution of the image for each band, and the margin that it reads."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcc.base.cached import cached
+from vcc.base.describe import Brief
+from vcc.base.errors import InputError
+from vcc.base.units import short
+from vcc.fields.grid import Grid
+from vcc.optics.band import STATE_THEM
+from vcc.optics.train import Train
+from vcc.optics.waves import Pupil
+from vcc.plan.operators import BlurByChannel
+
+Array = NDArray[np.float64]
+
+BEYOND = 0.005
+"""Share of light beyond the kernel's half width, for which the kernel is made wide enough."""
+WIDEST = 512
+"""Largest half width of a kernel, pixels."""
+SAME = 0.3
+"""Largest change of the kernel over the sensor for which the middle's stands for all of it, by `_change`."""
+COARSE = 128
+"""Points along each side of the pupils that are compared."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StopDiffraction(Brief):
+    """What waves add to the image by rays of a camera: the spread of a point in focus by its stop, for each band.
+
+    Args:
+        train: the camera as these bands meet it.
+        wavelengths: of the bands, metres.
+        pupil: of the middle of the sensor.
+    """
+
+    train: Train
+    wavelengths: tuple[float, ...]
+    pupil: Pupil
+
+    @classmethod
+    def of(cls, train: Train, grid: Grid) -> StopDiffraction:
+        """The stop's diffraction for a light field.
+
+        Args:
+            train: the camera as the light field's bands meet it.
+            grid: of the light field.
+
+        Raises:
+            InputError: a light field without wavelengths, a camera without a stop or with elements that
+                `vcc.optics.waves.Pupil.of` does not support, or a kernel that differs over the sensor.
+        """
+        if grid.wavelengths is None:
+            raise InputError(f"diffraction depends on the wavelength, and the light field states none: {STATE_THEM}")
+        made = cls(train, grid.wavelengths, Pupil.of(train))
+        if made.change > SAME:
+            raise InputError(
+                f"diffraction: the stop's diffraction differs over the sensor by {made.change:.0%} (root mean square "
+                f"of the middle's), and one convolution stands for at most {SAME:.0%}: leave diffraction out, take "
+                "a smaller sensor, or bring masks and stops closer together"
+            )
+        return made
+
+    @property
+    @cached
+    def change(self) -> float:
+        """The largest change of the kernel from the middle of the sensor to its corners and edges.
+
+        Root mean square of the difference, divided by that of the middle's kernel, brightness ignored.
+        """
+        height, width = self.train.sensor.size
+        wave = max(self.wavelengths)
+        here = Pupil.of(self.train, points=COARSE)
+        farthest = min(COARSE * step / wave for step in here.steps) / np.linalg.norm(here.sensor_from_slope, 2)
+        cycles = np.linspace(-farthest, farthest, 65)
+        frequencies = np.stack(np.meshgrid(cycles, cycles), axis=-1)
+        middle = here.otf(frequencies, wave)
+        worst = 0.0
+        for x, y in ((1, 0), (0, 1), (1, 1), (1, -1), (-1, 0), (0, -1), (-1, -1), (-1, 1)):
+            there = Pupil.of(self.train, (x * width / 2, y * height / 2), COARSE).otf(frequencies, wave)
+            worst = max(worst, float(np.sqrt(((there - middle) ** 2).sum() / (middle**2).sum())))
+        return worst
+
+    @property
+    def half_width(self) -> int:
+        """Of the kernels, pixels: all but `BEYOND` of the light of the longest wavelength, or `WIDEST`."""
+        pitch = min(self.train.sensor.pitches)
+        reach = self.pupil.falloff(max(self.wavelengths)) / (2 * math.pi * BEYOND * pitch)
+        return min(max(2, math.ceil(reach)), WIDEST)
+
+    @property
+    def beyond(self) -> float:
+        """Share of the light of the longest wavelength beyond the kernel, which arrives within it instead."""
+        reach = self.half_width * min(self.train.sensor.pitches)
+        return min(1.0, self.pupil.falloff(max(self.wavelengths)) / (2 * math.pi * reach))
+
+    @property
+    @cached
+    def kernel(self) -> Array:
+        """(rows, columns, bands), each of sum 1: the convolution of samples on pixels, band-limited.
+
+        Its transform is the optical transfer function up to half a cycle per pixel. Light that falls beyond its
+        border comes in from the other side: no light is lost.
+        """
+        size = 2 * self.half_width + 1
+        cycles = np.fft.fftfreq(size)
+        frequencies = np.stack(np.meshgrid(cycles, cycles), axis=-1) @ self.train.sensor.frame.inverse().linear
+        made = [
+            np.fft.fftshift(np.fft.ifft2(self.pupil.otf(frequencies, wavelength)).real)
+            for wavelength in self.wavelengths
+        ]
+        return np.stack(made, axis=-1)
+
+    @property
+    def widened(self) -> Train:
+        """The camera with a sensor that is larger by the kernel's half width on each side."""
+        rows, columns = self.train.sensor.shape
+        margin = 2 * self.half_width
+        return Train(
+            self.train.elements, replace(self.train.sensor, shape=(rows + margin, columns + margin))
+        )
+
+    @property
+    def operator(self) -> BlurByChannel:
+        """The convolution, as an operator after the core."""
+        return BlurByChannel(self.kernel, "diffraction by the stop")
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the convolution does, and what it leaves out, for the plan."""
+        size = 2 * self.half_width + 1
+        varies = "" if self.change < 0.01 else f"; towards the corners it changes by up to {self.change:.0%}"
+        return (
+            f"diffraction by the stop: the image is convolved with what waves make of a point in focus at "
+            f"{_bands(self.wavelengths)}, {size}×{size} pixels of {short(min(self.train.sensor.pitches))}, the "
+            f"middle's for all pixels{varies}; {self.beyond:.2%} of the light belongs beyond it and arrives within",
+        )
+
+
+def _bands(wavelengths: tuple[float, ...]) -> str:
+    low, high = (f"{each * 1e9:.4g}" for each in (min(wavelengths), max(wavelengths)))
+    return f"{low} nm" if low == high else f"{low} to {high} nm"
