@@ -15,6 +15,7 @@ from typing import Any
 from vcc.advice import explain_footprints, explain_rays
 from vcc.advice.explain_footprints import seconds_from_store, some_views
 from vcc.advice.limits import sampling_limits
+from vcc.advice.waves import wave_section, wavelength_of
 from vcc.advice.words import in_words
 from vcc.base.showing import Shown
 from vcc.fields.grid import SAMPLES_IN_WORDS, Block, Grid
@@ -69,8 +70,11 @@ def explained(train: Train, samples: Samples, plan: Plan, how: How, executor: An
     room = explain_rays if plan.by_rays else explain_footprints
     parts, seconds = room.sections(run)
     made = "How the picture is made\n" + "\n".join(f"  {note}" for note in (*plan.notes, *_by_direction(train)))
-    limits = _limits(train, samples.grid, how.scene_distance)
-    text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, *parts]))
+    shown = vergences(samples.grid, how.scene_distance)
+    scene = None if shown is None else (float(shown.min()), float(shown.max()))
+    limits = _limits(train, samples.grid, scene)
+    waves = wave_section(train, samples.grid, scene)
+    text = wrapped("\n\n".join([_what(train, samples.grid), made, limits, waves, *parts]))
     if samples.whole() is None:
         more, seconds = of_store(Drive(*required_samples(plan, samples), how))
         text = f"{text}\n\n{more}"
@@ -127,10 +131,8 @@ def _by_direction(train: Train) -> list[str]:
     return notes
 
 
-def _limits(train: Train, grid: Grid, scene_distance: float | None) -> str:
-    shown = vergences(grid, scene_distance)
-    scene = None if shown is None else (float(shown.min()), float(shown.max()))
-    return "What the samples can carry\n" + in_words(sampling_limits(train, grid, scene))
+def _limits(train: Train, grid: Grid, scene: tuple[float, float] | None) -> str:
+    return "What the samples can carry\n" + in_words(sampling_limits(train, grid, scene, wavelength_of(grid)))
 
 
 # --- sections for a light field on disk and for an executor: blocks, time, recommendation ---

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,14 @@ from vcc.advice import words
 from vcc.advice.folded import Folded, at_vergence, enough, singular, stretch
 from vcc.advice.words import SamplingItem
 from vcc.base.errors import InputError
+from vcc.base.units import short
 from vcc.optics.train import Stage
 from vcc.plan.parallax_rule import index_motions
 from vcc.shapes.directional import AngularFringes, Gaps
 from vcc.shapes.lattice import CellApertures
 from vcc.shapes.patterns import Bounded, Cells, CosineSum, FunctionPattern, Pattern
 
+_short = partial(short, digits=3)
 Array = NDArray[np.float64]
 Items = dict[str, SamplingItem]
 
@@ -150,7 +153,17 @@ class _Mask:
         if self.lever is None:
             return {}
         blur, nearer = math.sqrt(wavelength * self.lever), self.detail**2 / wavelength
-        return {f"{self.label} diffraction": words.fresnel_blur(self.label, blur, self.detail, nearer)}
+        number = self.detail**2 / blur**2 if blur else math.inf
+        spread = max(blur, blur**2 / self.detail)  # near the mask by the Fresnel zone, far from it by angle
+        way_out = f"the simulation does not show it; {_short(nearer)} before the sensor the number is 1"
+        return {
+            f"{self.label} diffraction": words.fresnel_blur(self.label, blur, self.detail, nearer),
+            f"{self.label} waves": self._waves(spread, number, way_out),
+        }
+
+    def _waves(self, spread: float, number: float, way_out: str) -> SamplingItem:
+        """An item for the spread of features by waves, with their Fresnel number."""
+        return words.feature_spread(self.label, spread, self.optics.pixel, self.detail, number, way_out)
 
     def holes(self, wavelength: float) -> Items:
         """Diffraction spread of a hole of width a, λ·d/a, compared with its image in the most blurred point."""
@@ -158,7 +171,12 @@ class _Mask:
             return {}
         blur = max(self.detail * self._growth(vergence) for vergence in self.optics.vergences)
         spread = wavelength * self.lever / self.detail
-        return {f"{self.label} diffraction": words.hole_diffraction(self.label, spread, blur)}
+        number = blur / spread if spread else math.inf
+        way_out = "capture(…, diffraction=True) adds it"
+        return {
+            f"{self.label} diffraction": words.hole_diffraction(self.label, spread, blur),
+            f"{self.label} waves": self._waves(spread, number, way_out),
+        }
 
     def _growth(self, vergence: float) -> float:
         """Size on the sensor / size at the mask of the light of a point at 1/Z: the ratio of A + B/Z."""

@@ -235,6 +235,20 @@ def hole_diffraction(label: str, spread: float, picture: float) -> SamplingItem:
     )
 
 
+def feature_spread(
+    label: str, spread: float, pixel: float, detail: float, fresnel: float, way_out: str
+) -> SamplingItem:
+    """Spread of a feature on the sensor by waves; its Fresnel number w²/(λ·d), and what can be done."""
+    rule = f"Fresnel number w²/(λ·d) of features of {_short(detail)}: {fresnel:.2g}"
+    return _item(
+        f"spread of the features of {label} by waves",
+        spread,
+        pixel,
+        f"Less than a pixel; {rule}.",
+        f"That is {spread / pixel:.2g} pixels ({rule}; rays hold far above 1): {way_out}.",
+    )
+
+
 # --- numbers that are not available ---
 
 
@@ -283,8 +297,8 @@ class SamplingLimits:
             sensor), ``"views across"``, ``"views down"`` (available within the stop; the limit is the number
             needed), ``"samples"`` (footprint of a light field's sample), ``"slope"``, ``"airy"``, for a lens
             array ``"view behind lenslet"`` and ``"lenslet airy"``, and for each mask with detail ``"LABEL
-            views"``, ``"LABEL samples"``, ``"LABEL shadow"`` and ``"LABEL diffraction"``. LABEL is the
-            element's name in messages, such as ``mask "code"``. Items that are not available are missing.
+            views"``, ``"LABEL samples"``, ``"LABEL shadow"``, ``"LABEL diffraction"`` and ``"LABEL waves"``.
+            LABEL is the element's name in messages, such as ``mask "code"``. Items that are not available are missing.
         wavelength: metres.
         focus_distance: distance in focus before the entrance plane, metres: positive or infinite; None if nothing
             before the camera is in focus.

@@ -21,12 +21,14 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import CellDeflection
+from vcc.optics.real_rays import entrance_box, light_stages
 from vcc.optics.train import Stage, Train
 
 Array = NDArray[np.float64]
 
 POINTS = 512
-"""Points of a pupil along each side of the stop: the transfer function of a disc is accurate to 10⁻⁴. Points, not
+"""Points of a pupil along each side of the stop: the transfer function of a disc is accurate to 10⁻⁴.
+Points, not
 means over cells: the square of a mean would darken every rim."""
 SINGULAR = 1e-12
 AT_SENSOR = 1e-6
@@ -70,15 +72,16 @@ class Pupil(Brief):
         by_place, by_slope = to_sensor.linear[:2, :2], to_sensor.linear[:2, 2:]
         if abs(np.linalg.det(by_slope)) <= SINGULAR * np.abs(by_slope).max() ** 2:
             raise InputError(
-                "diffraction: the sensor lies at an image of the entrance plane, where waves of all slopes meet in "
-                "one place: leave diffraction out"
+                "diffraction: the sensor lies at an image of the entrance plane, where light of all slopes "
+                "meets in one place: leave diffraction out"
             )
         _check_elements(train)
-        focus = -np.linalg.solve(by_slope, by_place)
+        focus: Array = -np.linalg.solve(by_slope, by_place)
         place = np.asarray(train.sensor.decentre) + np.asarray(at)
         chief = np.array([0.0, 0.0, *np.linalg.solve(by_slope, place - to_sensor.offset[:2])])
         per_place = np.vstack([np.eye(2), focus])
-        centre, half = _box(train, chief, per_place)
+        of_box = _box_of_rays if has_real_lens(train) else _box
+        centre, half = of_box(train, chief, per_place)
         if any(half <= 0):
             raise InputError("diffraction: the camera's stops leave no opening to light of a point in focus")
         x, y = (centre[axis] + half[axis] * ((np.arange(points) + 0.5) * 2 / points - 1) for axis in (0, 1))
@@ -166,9 +169,15 @@ class Pupil(Brief):
         lags = fftshift(ifft2(np.abs(fft2(field, (2 * self.points,) * 2)) ** 2))
         lags /= (self.amplitude**2).sum()
         # ∫ P(u + Δ)·P*(u) du = ∫ |P̂(ν)|² e^{2πiνΔ} dν, and an OTF has the other sign.
-        return np.conj(self._looked_up(lags.real, frequencies, wavelength) + 1j * self._looked_up(
-            lags.imag, frequencies, wavelength
-        ))
+        return np.conj(
+            self._looked_up(lags.real, frequencies, wavelength)
+            + 1j * self._looked_up(lags.imag, frequencies, wavelength)
+        )
+
+
+def has_real_lens(train: Train) -> bool:
+    """Whether rays of a camera are refracted by the surfaces of a real lens."""
+    return any(map(_is_real, train.stages))
 
 
 def point_spreads(
@@ -209,9 +218,8 @@ def _rays_otf(places: Array, weights: Array, size: int, within: int) -> NDArray[
             share = np.abs(1 - dx - part[:, 0]) * np.abs(1 - dy - part[:, 1]) * weights.reshape(-1)
             np.add.at(raster, ((low[:, 1] + dy) % fine, (low[:, 0] + dx) % fine), share)
     found = np.fft.fft2(raster / raster.sum())
-    keep = np.fft.fftfreq(size, 1 / size).astype(np.intp)
-    tent = np.sinc(keep / fine) ** 2
-    return np.asarray(found[np.ix_(keep, keep)] / (tent[:, None] * tent))
+    keep = np.fft.fftfreq(size, 1 / size).round().astype(np.intp)
+    return np.asarray(found[np.ix_(keep, keep)])
 
 
 def _check_elements(train: Train) -> None:
@@ -244,8 +252,8 @@ def _box(train: Train, chief: Array, per_place: Array) -> tuple[Array, Array]:
         scale = stage.arriving.linear[:2] @ per_place
         if np.abs(scale).max() <= AT_SENSOR:
             raise InputError(
-                f"diffraction: {stage.element.label} lies at the image, where it acts after the stop has spread the "
-                "light: leave diffraction out, or leave the element out"
+                f"diffraction: {stage.element.label} lies at the image, where it acts after the stop has spread "
+                "the light: leave diffraction out, or leave the element out"
             )
         if not all(map(math.isfinite, stage.opening)) or abs(np.linalg.det(scale)) <= SINGULAR:
             continue
@@ -261,10 +269,21 @@ def _box(train: Train, chief: Array, per_place: Array) -> tuple[Array, Array]:
     return (low + high) / 2, (high - low) / 2
 
 
+def _is_real(stage: Stage) -> bool:
+    return isinstance(stage.faces.bending, Aberrations)
+
+
+def _box_of_rays(train: Train, chief: Array, per_place: Array) -> tuple[Array, Array]:
+    """As `_box`, for cameras with real lenses, whose rims are found by tracing rays."""
+    vergence = float(np.trace(per_place[2:])) / 2
+    low, high = entrance_box(train, 1 / vergence if vergence else math.inf, -chief[2:])
+    return (low + high) / 2, (high - low) / 2
+
+
 def _traced(train: Train, rays: Array) -> tuple[Array, Array]:
     """Of rays (..., 4) at the entrance plane: the light that passes, (...), and places on the sensor (..., 2)."""
     light = np.ones(rays.shape[:-1])
-    for stage in train.stages:
+    for stage in light_stages(train):
         rays = np.asarray(stage.approach(rays))
         x, y = (rays[..., axis] - stage.element.decentre[axis] for axis in (0, 1))
         if stage.faces.pattern is not None:
@@ -280,7 +299,7 @@ def _bent(stage: Stage, rays: Array, lit: NDArray[np.bool_]) -> tuple[Array, Arr
         return stage.deflected(rays), np.ones(rays.shape[:-1])
     found, passed = rays.copy(), np.zeros(rays.shape[:-1])
     found[lit], passed[lit] = stage.crossed(rays[lit])
-    if isinstance(stage.faces.bending, Aberrations):
+    if _is_real(stage):
         found[passed == 0] = rays[passed == 0]
     return found, passed
 
@@ -289,4 +308,3 @@ def _summed(slopes: Array, step: float) -> Array:
     """The sum from the first point on along the last axis, by trapezoids."""
     steps = (slopes[..., 1:] + slopes[..., :-1]) * (step / 2)
     return np.concatenate([np.zeros_like(slopes[..., :1]), np.cumsum(steps, axis=-1)], axis=-1)
-

@@ -23,6 +23,7 @@ from vcc.plan.how import How
 from vcc.plan.in_focus import share_in_focus
 from vcc.plan.model import InFocus, MadeFor, Plan
 from vcc.plan.operators import OnSensor
+from vcc.plan.parallax_rule import vergences
 from vcc.plan.rays.compile import ByRays, RayChoices
 from vcc.plan.stop_diffraction import StopDiffraction
 
@@ -151,9 +152,9 @@ class _Making:
         refuse(train, "one plan for all channels")
         if how.diffraction and follow is not None:
             raise InputError(
-                "diffraction=True is not for plans that follow a camera while it learns: the stop's diffraction has no "
-                "derivative to its parameters here. For gradients to the samples, capture a light field of tensors "
-                "or use camera.operator(light_field, diffraction=True)"
+                "diffraction=True is not supported while a camera learns: the derivative of the stop's "
+                "diffraction to its parameters is not available. For gradients to the samples, capture a light "
+                "field of tensors, or use camera.operator(light_field, diffraction=True)"
             )
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts
@@ -293,8 +294,15 @@ class _Making:
         how = replace(self.how, diffraction=False)
         plan = _Making(added.widened, self.grid, how, parts=self.parts).plan
         after = (*plan.after, added.operator, OnSensor(added.half_width))
-        shape = self.train.sensor.shape
-        return replace(plan, sensor_shape=shape, after=after, notes=(*plan.notes, *added.notes))
+        known = how.scene_distance is not None or self.grid.disparity_range is not None
+        notes, warned = added.of_depths(vergences(self.grid, how.scene_distance) if known else None)
+        return replace(
+            plan,
+            sensor_shape=self.train.sensor.shape,
+            after=after,
+            notes=(*plan.notes, *added.notes, *notes),
+            cautions=(*plan.cautions, *warned),
+        )
 
     @property
     def known(self) -> Plan:
@@ -373,5 +381,10 @@ def mixture_of(trains: Sequence[Train], grid: Grid, how: How) -> Mixture | None:
 
 def _codes(trains: Sequence[Train], how: How) -> Codes | None:
     """The common description of trains if they differ in the cells of one mask, and footprints make the images."""
-    alone = how.method == "rays" or how.diffraction or how.between_views == "depth" or (how.samples, how.tolerance) != (None, None)
+    alone = (
+        how.method == "rays"
+        or how.diffraction
+        or how.between_views == "depth"
+        or (how.samples, how.tolerance) != (None, None)
+    )
     return None if alone or len(trains) < 2 else Codes.of(trains)

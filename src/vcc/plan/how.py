@@ -124,12 +124,12 @@ class How(Value, Shown):
             checks.one_of("engine", self.engine, get_args(EngineName))
         if self.threads is not None:
             checks.whole_number_between("threads", self.threads, 1)
-        if not isinstance(self.diffraction, bool):  # type: ignore[redundant-expr]
+        if not isinstance(self.diffraction, bool):
             raise InputError(f"diffraction is True or False, not {self.diffraction!r}")
         if self.diffraction and self.between_views == "depth":
             raise InputError(
-                "diffraction=True and between_views='depth' do not go together: the image is then a mixture of two, "
-                "and not one that can be convolved. Leave one of them out"
+                "diffraction=True and between_views='depth' do not go together: the image is then a mixture of "
+                "two, and no one convolution adds the diffraction. Leave one of them out"
             )
         if self.memory_limit is not None:
             checks.above_zero("memory_limit", self.memory_limit, "a number of bytes", infinite=True)

@@ -507,13 +507,22 @@ class BlurByChannel(Brief, Value):
             return {}
         lags = [_lags(length) for length in self.kernel.shape[:2]]
         each = range(self.kernel.shape[2])
-        return {"kernel": np.stack([correlated(weights[..., n : n + 1], raster[..., n : n + 1], *lags) for n in each], -1)}
+        return {
+            "kernel": np.stack(
+                [correlated(weights[..., n : n + 1], raster[..., n : n + 1], *lags) for n in each], -1
+            )
+        }
 
     def _each(self, raster: Any, verb: Callable[[Any, Blur], Any]) -> Any:
         made = [
-            verb(raster[..., n : n + 1], Blur(self.kernel[..., n], self.words)) for n in range(self.kernel.shape[2])
+            verb(raster[..., n : n + 1], Blur(self.kernel[..., n], self.words))
+            for n in range(self.kernel.shape[2])
         ]
-        return np.concatenate(made, -1) if isinstance(raster, np.ndarray) else array_namespace(raster).concat(made, axis=-1)
+        return (
+            np.concatenate(made, -1)
+            if isinstance(raster, np.ndarray)
+            else array_namespace(raster).concat(made, axis=-1)
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,19 +15,25 @@ from vcc.base.units import short
 from vcc.fields.grid import Grid
 from vcc.optics.band import STATE_THEM
 from vcc.optics.train import Train
-from vcc.optics.waves import Pupil
+from vcc.optics.waves import POINTS, Pupil, has_real_lens, point_spreads
 from vcc.plan.operators import BlurByChannel
 
 Array = NDArray[np.float64]
 
 BEYOND = 0.005
 """Share of light beyond the kernel's half width, for which the kernel is made wide enough."""
-WIDEST = 512
+WIDEST = 256
 """Largest half width of a kernel, pixels."""
 SAME = 0.3
 """Largest change of the kernel over the sensor for which the middle's stands for all of it, by `_change`."""
 COARSE = 128
 """Points along each side of the pupils that are compared."""
+ESTIMATED = 256
+"""Points along each side of the pupil by which errors out of focus are estimated: up to 32 waves of defocus."""
+LARGEST_ESTIMATE = 401
+"""Largest side, pixels, of the images of points by which they are estimated."""
+WORTH_A_WARNING = 0.2
+"""Share of a point's light in wrong pixels above which an image comes with a warning."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,13 +63,16 @@ class StopDiffraction(Brief):
                 `vcc.optics.waves.Pupil.of` does not support, or a kernel that differs over the sensor.
         """
         if grid.wavelengths is None:
-            raise InputError(f"diffraction depends on the wavelength, and the light field states none: {STATE_THEM}")
-        made = cls(train, grid.wavelengths, Pupil.of(train))
+            raise InputError(
+                f"diffraction depends on the wavelength, and the light field states none: {STATE_THEM}"
+            )
+        points = ESTIMATED if has_real_lens(train) else POINTS
+        made = cls(train, grid.wavelengths, Pupil.of(train, points=points))
         if made.change > SAME:
             raise InputError(
-                f"diffraction: the stop's diffraction differs over the sensor by {made.change:.0%} (root mean square "
-                f"of the middle's), and one convolution stands for at most {SAME:.0%}: leave diffraction out, take "
-                "a smaller sensor, or bring masks and stops closer together"
+                f"diffraction: the stop's diffraction differs over the sensor by {made.change:.0%} (root mean "
+                f"square of the middle's), and one convolution stands for at most {SAME:.0%}: leave diffraction "
+                "out, take a smaller sensor, or bring masks and stops closer together"
             )
         return made
 
@@ -83,7 +92,10 @@ class StopDiffraction(Brief):
         middle = here.otf(frequencies, wave)
         worst = 0.0
         for x, y in ((1, 0), (0, 1), (1, 1), (1, -1), (-1, 0), (0, -1), (-1, -1), (-1, 1)):
-            there = Pupil.of(self.train, (x * width / 2, y * height / 2), COARSE).otf(frequencies, wave)
+            try:
+                there = Pupil.of(self.train, (x * width / 2, y * height / 2), COARSE).otf(frequencies, wave)
+            except InputError:
+                continue  # no light of a point arrives there
             worst = max(worst, float(np.sqrt(((there - middle) ** 2).sum() / (middle**2).sum())))
         return worst
 
@@ -117,14 +129,63 @@ class StopDiffraction(Brief):
         ]
         return np.stack(made, axis=-1)
 
+    def errors(self, vergence: float) -> tuple[float, float] | None:
+        """What is wrong with the image of a point at 1/Z in the longest wavelength, compared with waves alone.
+
+        Returns:
+            The share of its light in other pixels than by waves, half the sum of absolute differences, in the
+            convolved image and in the image by rays; None beyond `ESTIMATED` points or `LARGEST_ESTIMATE`.
+        """
+        wavelength = max(self.wavelengths)
+        pupil, frame = self._estimated, self.train.sensor.frame.inverse().linear
+        lit = pupil.slopes(vergence)[pupil.amplitude > 0] @ (frame @ pupil.sensor_from_slope).T
+        size = 2 * math.ceil(np.abs(lit).max() + self.half_width) + 1
+        if size > LARGEST_ESTIMATE or not pupil.resolved(vergence, wavelength):
+            return None
+        by_waves, both, by_rays = point_spreads(pupil, vergence, wavelength, frame, size)
+        return tuple(float(np.abs(each - by_waves).sum()) / 2 for each in (both, by_rays))  # type: ignore[return-value]
+
+    @property
+    @cached
+    def _estimated(self) -> Pupil:
+        return Pupil.of(self.train, points=ESTIMATED)
+
+    def of_depths(self, shown: Array | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Notes and warnings on the error of the convolution at the depths of a scene.
+
+        Args:
+            shown: 1/Z of the parts of the scene, 1/m; None if it was not given.
+        """
+        if shown is None:
+            return (
+                "errors of the diffraction out of focus are not estimated: the light field states no depths",
+            ), ()
+        notes, warned = [], []
+        for vergence in sorted({float(shown.max()), float(shown.min())}, reverse=True):
+            where = "infinity" if vergence == 0 else short(1 / vergence, digits=3)
+            found = self.errors(vergence)
+            if found is None:
+                notes.append(
+                    f"at {where} the error of the diffraction is not estimated: beyond some 32 waves of "
+                    f"defocus, or a blur beyond {LARGEST_ESTIMATE} pixels"
+                )
+                continue
+            convolved, by_rays = found
+            words = (
+                f"of a point at {where}, {convolved:.1%} of the light is in other pixels than by waves of "
+                f"{max(self.wavelengths) * 1e9:.4g} nm ({by_rays:.1%} without diffraction=True)"
+            )
+            notes.append(words)
+            if convolved > WORTH_A_WARNING:
+                warned.append(f"diffraction=True is exact in focus only: {words}")
+        return tuple(notes), tuple(warned)
+
     @property
     def widened(self) -> Train:
         """The camera with a sensor that is larger by the kernel's half width on each side."""
         rows, columns = self.train.sensor.shape
         margin = 2 * self.half_width
-        return Train(
-            self.train.elements, replace(self.train.sensor, shape=(rows + margin, columns + margin))
-        )
+        return Train(self.train.elements, replace(self.train.sensor, shape=(rows + margin, columns + margin)))
 
     @property
     def operator(self) -> BlurByChannel:
@@ -139,7 +200,7 @@ class StopDiffraction(Brief):
         return (
             f"diffraction by the stop: the image is convolved with what waves make of a point in focus at "
             f"{_bands(self.wavelengths)}, {size}×{size} pixels of {short(min(self.train.sensor.pitches))}, the "
-            f"middle's for all pixels{varies}; {self.beyond:.2%} of the light belongs beyond it and arrives within",
+            f"middle's for all pixels{varies}; {self.beyond:.2%} of the light belongs beyond and is kept within",
         )
 
 
