@@ -30,6 +30,7 @@ Items = dict[str, SamplingItem]
 
 GREEN_LIGHT = 550e-9
 """Default wavelength, metres: near the highest sensitivity of eyes and sensors."""
+BY_REQUEST = "shows it with diffraction=True only"
 LARGEST_SLOPE = 0.3
 """Beyond this slope (17°), tangent and sine differ by more than 4.4 %; paraxial optics assumes they are equal."""
 AIRY = 0.61
@@ -207,7 +208,7 @@ def _airy(optics: Folded, wavelength: float) -> Items:
     half, lever = optics.half_width, stretch(optics.sensor_from_slope)
     if half is None or lever <= ROUNDING * half:
         return {}
-    return {"airy": words.airy("on the sensor", AIRY * wavelength * lever / half, optics.pixel)}
+    return {"airy": words.airy("on the sensor", AIRY * wavelength * lever / half, optics.pixel, BY_REQUEST)}
 
 
 def _slope(optics: Folded) -> Items:

@@ -175,7 +175,7 @@ class _Mask:
         way_out = "capture(…, diffraction=True) adds it"
         return {
             f"{self.label} diffraction": words.hole_diffraction(self.label, spread, blur),
-            f"{self.label} waves": self._waves(spread, number, way_out),
+            f"{self.label} waves": self._waves(max(spread, math.sqrt(spread * blur)), number, way_out),
         }
 
     def _growth(self, vergence: float) -> float:

@@ -16,6 +16,8 @@ from vcc.optics.deflections import CellDeflection
 from vcc.optics.phase_plate import SurfaceDeflection
 from vcc.optics.train import Stage, Train
 
+NOTHING = 1e-9
+"""Blur, metres, that is rounding."""
 RASTER = 256
 """Points along each side of a surface where the width of its features is measured."""
 
@@ -55,7 +57,7 @@ def _airy(optics: Folded, wavelength: float) -> list[str]:
         for vergence in dict.fromkeys(reversed(optics.vergences)):
             blur = 2 * half * stretch(at_vergence(optics.to_sensor, vergence))
             where = distance_in_words(distance_of(vergence))
-            blurs.append(f"{short(blur, digits=2)} at {where}")
+            blurs.append(f"{short(blur, digits=2) if blur > NOTHING else 'none'} at {where}")
         line += f"; blur by rays {', '.join(blurs)}"
     return [line]
 

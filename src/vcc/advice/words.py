@@ -162,14 +162,14 @@ def views_behind_lenslet(label: str, apart: float, pixel: float, needed: int) ->
     )
 
 
-def airy(where: str, radius: float, pixel: float) -> SamplingItem:
-    """Blur by diffraction."""
+def airy(where: str, radius: float, pixel: float, shown: str = "does not show it") -> SamplingItem:
+    """Blur by diffraction; ``shown``: what an image has of it."""
     return _item(
         f"Airy radius {where}",
         radius,
         pixel,
         "Diffraction is finer than the pixels.",
-        "Light itself blurs over more than a pixel, and the simulation does not show it: open the stop "
+        f"Light itself blurs over more than a pixel, and the simulation {shown}: open the stop "
         f"{radius / pixel:.2g} times as wide, or take pixels of {short(radius, digits=2)}.",
     )
 
@@ -298,7 +298,8 @@ class SamplingLimits:
             needed), ``"samples"`` (footprint of a light field's sample), ``"slope"``, ``"airy"``, for a lens
             array ``"view behind lenslet"`` and ``"lenslet airy"``, and for each mask with detail ``"LABEL
             views"``, ``"LABEL samples"``, ``"LABEL shadow"``, ``"LABEL diffraction"`` and ``"LABEL waves"``.
-            LABEL is the element's name in messages, such as ``mask "code"``. Items that are not available are missing.
+            LABEL is the element's name in messages, such as ``mask "code"``. Items that are not available are
+            missing.
         wavelength: metres.
         focus_distance: distance in focus before the entrance plane, metres: positive or infinite; None if nothing
             before the camera is in focus.

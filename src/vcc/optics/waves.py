@@ -76,7 +76,7 @@ class Pupil(Brief):
                 "meets in one place: leave diffraction out"
             )
         _check_elements(train)
-        focus: Array = -np.linalg.solve(by_slope, by_place)
+        focus = np.asarray(-np.linalg.solve(by_slope, by_place), dtype=np.float64)
         place = np.asarray(train.sensor.decentre) + np.asarray(at)
         chief = np.array([0.0, 0.0, *np.linalg.solve(by_slope, place - to_sensor.offset[:2])])
         per_place = np.vstack([np.eye(2), focus])

@@ -32,6 +32,8 @@ ESTIMATED = 256
 """Points along each side of the pupil by which errors out of focus are estimated: up to 32 waves of defocus."""
 LARGEST_ESTIMATE = 401
 """Largest side, pixels, of the images of points by which they are estimated."""
+HALO = 100
+"""Largest margin around the blur by rays in them, pixels; light beyond comes in again, in all images alike."""
 WORTH_A_WARNING = 0.2
 """Share of a point's light in wrong pixels above which an image comes with a warning."""
 
@@ -70,33 +72,35 @@ class StopDiffraction(Brief):
         made = cls(train, grid.wavelengths, Pupil.of(train, points=points))
         if made.change > SAME:
             raise InputError(
-                f"diffraction: the stop's diffraction differs over the sensor by {made.change:.0%} (root mean "
-                f"square of the middle's), and one convolution stands for at most {SAME:.0%}: leave diffraction "
-                "out, take a smaller sensor, or bring masks and stops closer together"
+                f"diffraction: over the sensor, the stop's diffraction puts {made.change:.0%} of a point's light "
+                f"in other places, and one convolution stands for at most {SAME:.0%}: leave diffraction out, "
+                "take a smaller sensor, or bring masks and stops closer together"
             )
         return made
 
     @property
     @cached
     def change(self) -> float:
-        """The largest change of the kernel from the middle of the sensor to its corners and edges.
+        """The largest change of the kernel from the middle of the sensor to its corners and edges, 0 to 1.
 
-        Root mean square of the difference, divided by that of the middle's kernel, brightness ignored.
+        The share of a point's light that the kernel there brings to other places, brightness ignored: half the sum
+        of absolute differences.
         """
         height, width = self.train.sensor.size
         wave = max(self.wavelengths)
         here = Pupil.of(self.train, points=COARSE)
-        farthest = min(COARSE * step / wave for step in here.steps) / np.linalg.norm(here.sensor_from_slope, 2)
-        cycles = np.linspace(-farthest, farthest, 65)
+        spacing = 2 * min(here.steps) / (wave * np.linalg.norm(here.sensor_from_slope, 2))
+        cycles = np.fft.fftfreq(COARSE, 1 / (COARSE * spacing))
         frequencies = np.stack(np.meshgrid(cycles, cycles), axis=-1)
-        middle = here.otf(frequencies, wave)
+        middle = np.fft.ifft2(here.otf(frequencies, wave)).real
         worst = 0.0
         for x, y in ((1, 0), (0, 1), (1, 1), (1, -1), (-1, 0), (0, -1), (-1, -1), (-1, 1)):
             try:
-                there = Pupil.of(self.train, (x * width / 2, y * height / 2), COARSE).otf(frequencies, wave)
+                pupil = Pupil.of(self.train, (x * width / 2, y * height / 2), COARSE)
             except InputError:
                 continue  # no light of a point arrives there
-            worst = max(worst, float(np.sqrt(((there - middle) ** 2).sum() / (middle**2).sum())))
+            there = np.fft.ifft2(pupil.otf(frequencies, wave)).real
+            worst = max(worst, float(np.abs(there - middle).sum()) / 2)
         return worst
 
     @property
@@ -139,7 +143,7 @@ class StopDiffraction(Brief):
         wavelength = max(self.wavelengths)
         pupil, frame = self._estimated, self.train.sensor.frame.inverse().linear
         lit = pupil.slopes(vergence)[pupil.amplitude > 0] @ (frame @ pupil.sensor_from_slope).T
-        size = 2 * math.ceil(np.abs(lit).max() + self.half_width) + 1
+        size = 2 * math.ceil(np.abs(lit).max() + min(self.half_width, HALO)) + 1
         if size > LARGEST_ESTIMATE or not pupil.resolved(vergence, wavelength):
             return None
         by_waves, both, by_rays = point_spreads(pupil, vergence, wavelength, frame, size)
@@ -151,7 +155,7 @@ class StopDiffraction(Brief):
         return Pupil.of(self.train, points=ESTIMATED)
 
     def of_depths(self, shown: Array | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Notes and warnings on the error of the convolution at the depths of a scene.
+        """Notes on the error of the convolution at the nearest and farthest depth, and a warning of the worse.
 
         Args:
             shown: 1/Z of the parts of the scene, 1/m; None if it was not given.
@@ -160,7 +164,8 @@ class StopDiffraction(Brief):
             return (
                 "errors of the diffraction out of focus are not estimated: the light field states no depths",
             ), ()
-        notes, warned = [], []
+        notes: list[str] = []
+        worst, warned = WORTH_A_WARNING, ""
         for vergence in sorted({float(shown.max()), float(shown.min())}, reverse=True):
             where = "infinity" if vergence == 0 else short(1 / vergence, digits=3)
             found = self.errors(vergence)
@@ -176,9 +181,9 @@ class StopDiffraction(Brief):
                 f"{max(self.wavelengths) * 1e9:.4g} nm ({by_rays:.1%} without diffraction=True)"
             )
             notes.append(words)
-            if convolved > WORTH_A_WARNING:
-                warned.append(f"diffraction=True is exact in focus only: {words}")
-        return tuple(notes), tuple(warned)
+            if convolved > worst:
+                worst, warned = convolved, f"diffraction=True is exact in focus only: {words}"
+        return tuple(notes), (warned,) if warned else ()
 
     @property
     def widened(self) -> Train:
@@ -196,7 +201,9 @@ class StopDiffraction(Brief):
     def notes(self) -> tuple[str, ...]:
         """What the convolution does, and what it leaves out, for the plan."""
         size = 2 * self.half_width + 1
-        varies = "" if self.change < 0.01 else f"; towards the corners it changes by up to {self.change:.0%}"
+        varies = (
+            "" if self.change < 0.01 else f"; towards the corners up to {self.change:.0%} of it goes elsewhere"
+        )
         return (
             f"diffraction by the stop: the image is convolved with what waves make of a point in focus at "
             f"{_bands(self.wavelengths)}, {size}×{size} pixels of {short(min(self.train.sensor.pitches))}, the "
