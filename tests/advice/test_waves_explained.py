@@ -30,10 +30,11 @@ def test_a_mask_without_a_lens(cell, finer):
     mask = vcc.Mask(CELLS, width=40 * cell, name="code")
     item = sampling_advice(lensless(mask), light(), depths=(1.0, 2.0))['mask "code" waves']
     zone = math.sqrt(GREEN * 5 * mm)
-    assert item.value == pytest.approx(zone**2 / cell if finer else zone, rel=1e-9)
+    shadow = 1 + 5 * mm / 1.0  # of a point at 1 m
+    assert item.value == pytest.approx(zone**2 / cell if finer else zone * math.sqrt(shadow), rel=1e-9)
     assert item.limit == 5 * um
     assert not item.fine
-    assert f"{cell**2 / zone**2:.2g}; rays hold far above 1" in item.advice
+    assert f"{shadow * cell**2 / zone**2:.2g}; rays hold far above 1" in item.advice
     assert f"{item.value / (5 * um):.2g} pixels" in item.advice
 
 

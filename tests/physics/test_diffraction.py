@@ -289,7 +289,7 @@ GRAIN = np.random.default_rng(0).integers(0, 2, (64, 64)).astype(float)
     ("elements", "options", "words"),
     [
         ([vcc.Lens(F)], {}, "needs the stop"),
-        ([LENS, ARRAY], {}, "each cell diffracts by itself"),
+        ([LENS, ARRAY], {}, "each cell diffracts separately"),
         ([LENS, vcc.Mask(GRAIN, width=4 * mm, z=47 * mm)], {}, "over the sensor"),
         ([LENS, vcc.Mask(GRAIN, width=4 * mm, z=F)], {}, "lies at the image"),
         ([LENS, vcc.AngleFilter(vcc.patterns.Circle(0.1), z=10 * mm)], {}, "by its direction"),

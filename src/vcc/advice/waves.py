@@ -90,7 +90,7 @@ def _of_cells_and_plates(optics: Folded, stage: Stage, wavelength: float) -> lis
     ]
 
 
-HOLDS = 10.0
+HOLDS = 20.0
 """Fresnel number of a feature from which on its image by rays and by waves agree to about a tenth of the light;
 measured on the docs page "Waves"."""
 

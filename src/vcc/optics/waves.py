@@ -233,7 +233,7 @@ def _check_elements(train: Train) -> None:
         if isinstance(stage.faces.bending, CellDeflection):
             raise InputError(
                 f"diffraction: the stop's diffraction is one convolution of the image, and behind the cells of "
-                f"{label} each cell diffracts by itself: leave diffraction out; camera.explain(light_field) "
+                f"{label} each cell diffracts separately: leave diffraction out; camera.explain(light_field) "
                 "reports their Airy radius"
             )
         if stage.faces.spread is not None and not stage.faces.spread.uniform:
