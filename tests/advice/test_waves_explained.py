@@ -76,6 +76,13 @@ def test_a_plate_without_a_lens_is_told_the_number_of_its_hills():
     assert "rays and waves differ visibly" in text
 
 
+def test_a_diffuser_is_told_the_features_that_its_slopes_need():
+    camera = lensless(vcc.Diffuser(vcc.kernels.TopHat(0.02), name="ground"))
+    text = " ".join(camera.explain(light([GREEN])).split())
+    assert 'diffuser "ground": light spreads as its kernel only if' in text
+    assert f"λ/slope = {GREEN / 0.01 / um:.2g} um, for slopes up to 0.01" in text  # half of its width
+
+
 def test_lenslets_are_told_theirs():
     array = vcc.LensArray(0.1 * mm, 1 * mm, z=49 * mm, name="micro")
     camera = vcc.Camera([vcc.Lens(50 * mm, diameter=5 * mm), array], vcc.Sensor(50 * mm, (200, 200), 5 * um))

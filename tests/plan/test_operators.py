@@ -19,6 +19,7 @@ from vcc.plan.operators import (
     LONG,
     AlongAxes,
     Blur,
+    BlurByChannel,
     BlurViews,
     DarkBorder,
     OnSensor,
@@ -103,6 +104,12 @@ def on_sensor(rng: np.random.Generator, kind: str) -> tuple[OnSensor, np.ndarray
     return OnSensor(guard, transmission, detail), raster
 
 
+def by_channel(rng: np.random.Generator) -> tuple[BlurByChannel, np.ndarray]:
+    """An operator, and a raster of as many channels."""
+    raster = drawn_raster(rng)
+    return BlurByChannel(signed(rng, odd(rng), odd(rng), raster.shape[2]), "blur"), raster
+
+
 def assert_adjoint(operator, x: np.ndarray) -> None:
     """⟨A x, y⟩ = ⟨x, Aᵀ y⟩ for another random y, in NumPy and in PyTorch."""
     for library in (np.asarray, torch.asarray):
@@ -131,6 +138,17 @@ def test_operators_on_the_raster_and_their_transposes(name):
 def test_the_sensors_part_and_its_transpose(kind):
     for rng in map(np.random.default_rng, SEEDS):
         assert_adjoint(*on_sensor(rng, kind))
+
+
+def test_a_kernel_for_each_channel():
+    """Its transpose, its derivative, and each channel as `Blur` alone."""
+    for rng in map(np.random.default_rng, SEEDS):
+        operator, raster = by_channel(rng)
+        assert_adjoint(operator, raster)
+        assert_pulls_what_changes(operator, raster, rng)
+        for n in range(raster.shape[2]):
+            alone = Blur(operator.kernel[..., n], "blur").apply(raster[..., n : n + 1])
+            np.testing.assert_array_equal(operator.apply(raster)[..., n : n + 1], alone)
 
 
 def test_operators_are_linear():

@@ -42,6 +42,11 @@ def wave_section(train: Train, grid: Grid, vergences: tuple[float, float] | None
         lines += _airy(optics, wavelength)
     for stage in train.stages:
         lines += _of_cells_and_plates(optics, stage, wavelength)
+        if stage.faces.spread is not None and (steepest := max(stage.faces.spread.reach)):
+            lines.append(
+                f"{stage.element.label}: light spreads as its kernel only if the features of the real surface are "
+                f"well above λ/slope = {short(wavelength / steepest, digits=2)}, for slopes up to {steepest:.2g}"
+            )
     return "Waves\n" + "\n".join(f"  {line}" for line in lines)
 
 

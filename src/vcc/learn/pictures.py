@@ -87,7 +87,8 @@ class Work:
         # Rounded: estimates of disparity differ in the last digits between machines.
         seen = disparities and [round(float(each), 3) for each in disparities]
         bands = [grid.wavelengths] if self.camera.depends_on_bands else []
-        decisive = [field.name for field in fields(How) if field.name not in (*OF_THE_RUN, "seed")]
+        left_out = (*OF_THE_RUN, "seed", "diffraction")  # the last is always False here
+        decisive = [field.name for field in fields(How) if field.name not in left_out]
         return {
             "camera": _reported(self.camera),
             "light field": _reported(grid.shape[:4], grid.frame.matrix, grid.sample, grid.extent, seen, *bands),
