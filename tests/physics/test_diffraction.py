@@ -321,10 +321,28 @@ def test_the_plan_states_the_error_out_of_focus():
     lens = camera(LENS, pitch=4 * um)
     light = star(lens, side=41)
     (caution,) = lens.compile(light, diffraction=True, scene_distance=10.0).cautions
-    assert re.search(r"exact in focus only: of a point at 10 m, 2\d\.\d%", caution)
+    assert re.search(r"without aberrations only: of a point at 10 m, 2\d\.\d%", caution)
     notes = lens.compile(light, diffraction=True).notes
-    assert any("of a point at infinity, 0.0% of the light" in note for note in notes)
+    assert any("of the point in focus, 0.0% of the light" in note for note in notes)
     assert any("0.50% of the light belongs beyond" in note for note in notes)
+
+
+def test_two_halves_of_a_stop_are_said_to_spread_more_than_the_whole():
+    """Behind a biprism in focus, each half spreads alone, twice as wide along x, and the plan says by how much.
+
+    Depths are not stated, so that the point in focus alone is estimated.
+    """
+    prism = vcc.Biprism(0.002)
+    lens = camera(vcc.Lens(F), SQUARE, prism, pitch=4 * um)
+    light = star(lens, side=41)
+    unknown = vcc.LightField(light.values, light.frame, sample="point", wavelengths=[GREEN])
+    (caution,) = lens.compile(unknown, diffraction=True).cautions
+    stated = float(re.search(r"of the point in focus, ([\d.]+)% of the light", caution)[1]) / 100
+    # Far apart (0.2 mm); transfer functions are triangles up to 1/(λN) and 1/(2λN), on pixels of 0.9 λN.
+    f = np.fft.fftfreq(401)
+    whole, half = (np.maximum(1 - np.abs(f) * wide * SPREAD / (4 * um), 0) for wide in (1, 2))
+    truth = np.abs(np.fft.ifft((whole - half) * np.sinc(f))).sum() / 2
+    assert stated == pytest.approx(truth, abs=0.02)
 
 
 # --- real lenses

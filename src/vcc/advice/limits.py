@@ -31,6 +31,7 @@ Items = dict[str, SamplingItem]
 GREEN_LIGHT = 550e-9
 """Default wavelength, metres: near the highest sensitivity of eyes and sensors."""
 BY_REQUEST = "shows it with diffraction=True only"
+"""What an image has of the Airy pattern of the stop."""
 LARGEST_SLOPE = 0.3
 """Beyond this slope (17°), tangent and sine differ by more than 4.4 %; paraxial optics assumes they are equal."""
 AIRY = 0.61

@@ -16,6 +16,8 @@ from vcc.optics.deflections import CellDeflection
 from vcc.optics.phase_plate import SurfaceDeflection
 from vcc.optics.train import Stage, Train
 
+FEWEST = 8
+"""Points of the raster across a hill, below which the raster takes a smaller part of the surface."""
 NOTHING = 1e-9
 """Blur, metres, that is rounding."""
 RASTER = 256
@@ -113,10 +115,18 @@ def feature_width(bending: SurfaceDeflection, stage: Stage, optics: Folded) -> f
     half = min(min(stage.opening) / 2, optics.half_width or math.inf)
     if not math.isfinite(half):
         return None
-    places = (np.arange(RASTER) - (RASTER - 1) / 2) * (2 * half / RASTER)
-    x, y = np.meshgrid(places, places)
-    slopes = bending(x, y)
+    width = _width_within(bending, half)
+    while width is not None and width < FEWEST * 2 * half / RASTER and half > NOTHING:  # too fine for the raster
+        half /= 4
+        width = _width_within(bending, half)
+    return width
+
+
+def _width_within(bending: SurfaceDeflection, half: float) -> float | None:
+    """The same within a square of this half side; None if the surface bends nothing there, or all alike."""
     step = 2 * half / RASTER
+    places = (np.arange(RASTER) - (RASTER - 1) / 2) * step
+    slopes = bending(*np.meshgrid(places, places))
     slope = math.sqrt(sum(float(np.var(each)) for each in slopes))
     curvature = (
         math.sqrt(

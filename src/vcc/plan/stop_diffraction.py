@@ -29,7 +29,7 @@ SAME = 0.3
 COARSE = 128
 """Points along each side of the pupils that are compared."""
 ESTIMATED = 256
-"""Points along each side of the pupil by which errors out of focus are estimated: up to 32 waves of defocus."""
+"""Points along each side of the pupil by which errors out of focus are estimated: up to 16 waves of defocus."""
 LARGEST_ESTIMATE = 401
 """Largest side, pixels, of the images of points by which they are estimated."""
 HALO = 100
@@ -137,8 +137,9 @@ class StopDiffraction(Brief):
         """What is wrong with the image of a point at 1/Z in the longest wavelength, compared with waves alone.
 
         Returns:
-            The share of its light in other pixels than by waves, half the sum of absolute differences, in the
-            convolved image and in the image by rays; None beyond `ESTIMATED` points or `LARGEST_ESTIMATE`.
+            The share of its light in other pixels than by waves, half the sum of absolute differences of what
+            pixels resolve, in the convolved image and in the image by rays; None beyond `ESTIMATED` points or
+            `LARGEST_ESTIMATE`.
         """
         wavelength = max(self.wavelengths)
         pupil, frame = self._estimated, self.train.sensor.frame.inverse().linear
@@ -160,29 +161,34 @@ class StopDiffraction(Brief):
         Args:
             shown: 1/Z of the parts of the scene, 1/m; None if it was not given.
         """
+        focus = float(np.trace(self.pupil.focus)) / 2
+        ends = {focus} if shown is None else {float(shown.max()), float(shown.min())}
+        notes, worst, warned = list[str](), WORTH_A_WARNING, ""
         if shown is None:
-            return (
-                "errors of the diffraction out of focus are not estimated: the light field states no depths",
-            ), ()
-        notes: list[str] = []
-        worst, warned = WORTH_A_WARNING, ""
-        for vergence in sorted({float(shown.max()), float(shown.min())}, reverse=True):
+            notes.append(
+                "errors of the diffraction out of focus are not estimated: the light field states no depths"
+            )
+        for vergence in sorted(ends, reverse=True):
             where = "infinity" if vergence == 0 else short(1 / vergence, digits=3)
+            where = "the point in focus" if math.isclose(vergence, focus, abs_tol=1e-9) else f"a point at {where}"
             found = self.errors(vergence)
             if found is None:
                 notes.append(
-                    f"at {where} the error of the diffraction is not estimated: beyond some 32 waves of "
+                    f"for {where} the error of the diffraction is not estimated: beyond some 16 waves of "
                     f"defocus, or a blur beyond {LARGEST_ESTIMATE} pixels"
                 )
                 continue
             convolved, by_rays = found
             words = (
-                f"of a point at {where}, {convolved:.1%} of the light is in other pixels than by waves of "
+                f"of {where}, {convolved:.1%} of the light is in other pixels than by waves of "
                 f"{max(self.wavelengths) * 1e9:.4g} nm ({by_rays:.1%} without diffraction=True)"
             )
             notes.append(words)
             if convolved > worst:
-                worst, warned = convolved, f"diffraction=True is exact in focus only: {words}"
+                worst, warned = (
+                    convolved,
+                    f"diffraction=True is exact for points in focus without aberrations only: {words}",
+                )
         return tuple(notes), (warned,) if warned else ()
 
     @property
