@@ -5,7 +5,7 @@ the sensor, with ψ the defocus and B the place on the sensor per slope (Bastiaa
 applied to optical signals and systems, Optics Communications 25, 1978). Rays keep |P(u)|² of it, all in one
 direction ν. The stop's diffraction puts its other marginal back, |P̂(ν)|², as the same spread of slopes for all u:
 the image by rays is convolved with the image that waves make of a point in focus. This is exact in focus without
-aberrations, and at any defocus for a Gaussian stop; the second moment is exact at any defocus for every real P.
+aberrations, and at any defocus for a Gaussian stop.
 """
 
 from __future__ import annotations
