@@ -14,6 +14,8 @@ IN_TIME = 0.015
 as much again for each, on the same machine."""
 CLOSE = 1.3
 """A finer image is made in any case if it takes up to this times the quickest, or this times its processor time."""
+BESIDES = 0.010
+"""Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
 """Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
 LEFT = 0.4
@@ -51,7 +53,7 @@ class Pace:
     """Chooses the fineness of an image from the times of earlier images of the same kind of camera.
 
     The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the clock
-    or by processor time. For a
+    or by all the processor time that it costs. For a
     fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
     scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
     busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
@@ -110,8 +112,8 @@ class Pace:
             return COARSER[0]
         expected = {each: self._expected(of, each) for each in (WHOLE, *COARSER)}
         limit = max(IN_TIME, CLOSE * min(expected.values()))
-        work = {each: times.work for each, times in self._kept[of][1].items()}
-        close = CLOSE * min(work.values())
+        work = {each: BESIDES + times.work for each, times in self._kept[of][1].items()}
+        close = CLOSE * work.get(min(expected, key=expected.__getitem__), 0.0)
         return next(
             each
             for each, seconds in expected.items()
