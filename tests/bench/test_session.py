@@ -510,7 +510,22 @@ def test_views_that_were_not_recorded_are_known_in_coarse_images_and_named():
     client.do("hello", turn=1)
     notes, _ = client.until("notes")
     client.close()
-    assert any("rendered from the others" in note["words"] and "(0, 2)" in note["words"] for note in notes["notes"])
+    assert any(
+        "rendered from the others" in note["words"] and "(0, 2)" in note["words"] for note in notes["notes"]
+    )
+
+
+def test_a_camera_that_begins_with_glass_gets_wavelengths_and_says_so():
+    client = Client(
+        offered(start=START.changed(["elements", 0, "glass"], {"name": "catalogue", "glass": "N-BK7"}))
+    )
+    client.do("hello", turn=1)
+    remark, _ = client.until("refused")
+    assert remark["done"]
+    assert "540 nm" in remark["words"]
+    client.until("picture")
+    assert client.session.document.wavelengths == ("610 nm", "540 nm", "465 nm")
+    client.close()
 
 
 def test_a_plan_is_given_up_where_its_picture_is_no_longer_wanted(monkeypatch):

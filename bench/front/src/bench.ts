@@ -129,7 +129,7 @@ export class Bench extends EventTarget {
       if (this.turn - this.heard < this.host.ahead) this.sendNext();
       this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
     } else {
-      this.next = null;
+      this.next = this.remark = null;
       this.settle();
       this.ask({ do: "set", where, value, moving: false });
     }
@@ -145,6 +145,7 @@ export class Bench extends EventTarget {
   }
 
   act(message: { do: string } & { [name: string]: unknown }, buffers?: ArrayBuffer[]): void {
+    this.remark = null; // of what was done before
     window.clearTimeout(this.restTimer);
     this.next = null;
     this.settle();

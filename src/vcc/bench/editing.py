@@ -127,6 +127,18 @@ class Editing:
             changed = changed.changed(place, each)
         self.put(self._with_colours(changed), moving)
 
+    def add_colours(self) -> str | None:
+        """Add wavelengths to a document that needs them, which a file or an address describes; return a remark."""
+        coloured = self._with_colours(self.document)
+        if coloured is self.document:
+            return None
+        if self.history.can_undo:
+            self.put(coloured)
+        else:
+            coloured, self.described = self.checked(coloured)
+            self.history = History(coloured)
+        return f"The light field has got the wavelengths {', '.join(COLOURS)}, because an element depends on them."
+
     def _with_colours(self, document: Document) -> Document:
         """With wavelengths of red, green and blue if an element depends on them and the light field has none."""
         field = self.offered.field(document.light_field)

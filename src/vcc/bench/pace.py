@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken
 
 IN_TIME = 0.015
-"""Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made. The browser needs
-as much again for each, on the same machine."""
+"""Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made. The browser of
+the same machine needs as much again for each."""
 CLOSE = 1.3
-"""A finer image is made in any case if it takes up to this times the quickest, or this times its processor time."""
+"""A finer image is made in any case if it takes up to this times the quickest, or this times its processor
+time."""
 BESIDES = 0.010
 """Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
@@ -52,8 +53,8 @@ class _Times:
 class Pace:
     """Chooses the fineness of an image from the times of earlier images of the same kind of camera.
 
-    The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the clock
-    or by all the processor time that it costs. For a
+    The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the
+    clock or by the processor time that it costs with everything around it. For a
     fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
     scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
     busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
