@@ -369,7 +369,7 @@ def in_jupyterlab(browser: Any, case: Case, files: tuple[Path, Path]) -> str:
         wait_for(port)
         page.goto(f"http://127.0.0.1:{port}/lab/tree/bench.ipynb?token={token}", wait_until="domcontentloaded")
         page.locator(".jp-CodeCell .cm-content").first.click(timeout=60_000)
-        page.wait_for_timeout(3000)  # until the kernel is there
+        page.locator('.jp-Notebook-ExecutionIndicator[data-status="idle"]').first.wait_for(timeout=60_000)
         page.keyboard.press("Control+Enter")
         found = told(case, drag(page, case))
         context.close()
