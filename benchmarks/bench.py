@@ -21,7 +21,6 @@ import os
 import platform
 import secrets
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -246,12 +245,14 @@ def process(*command: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """A process of ours, and its end."""
     options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "cwd": folder}
     with subprocess.Popen(command, **options) as running:
-        yield running
-        running.send_signal(signal.SIGINT)
         try:
-            running.communicate(timeout=10)
-        except subprocess.TimeoutExpired:
-            running.kill()
+            yield running
+        finally:
+            running.terminate()
+            try:
+                running.wait(timeout=10)
+            except subprocess.TimeoutExpired:
+                running.kill()
 
 
 @contextlib.contextmanager
