@@ -21,7 +21,6 @@ import os
 import platform
 import secrets
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -246,12 +245,14 @@ def process(*command: str, folder: Path) -> Iterator[subprocess.Popen[str]]:
     """A process of ours, and its end."""
     options: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True, "cwd": folder}
     with subprocess.Popen(command, **options) as running:
-        yield running
-        running.send_signal(signal.SIGINT)
         try:
-            running.communicate(timeout=10)
-        except subprocess.TimeoutExpired:
-            running.kill()
+            yield running
+        finally:
+            running.terminate()
+            try:
+                running.wait(timeout=10)
+            except subprocess.TimeoutExpired:
+                running.kill()
 
 
 @contextlib.contextmanager
@@ -369,7 +370,7 @@ def in_jupyterlab(browser: Any, case: Case, files: tuple[Path, Path]) -> str:
         wait_for(port)
         page.goto(f"http://127.0.0.1:{port}/lab/tree/bench.ipynb?token={token}", wait_until="domcontentloaded")
         page.locator(".jp-CodeCell .cm-content").first.click(timeout=60_000)
-        page.wait_for_timeout(3000)  # until the kernel is there
+        page.locator('.jp-Notebook-ExecutionIndicator[data-status="idle"]').first.wait_for(timeout=60_000)
         page.keyboard.press("Control+Enter")
         found = told(case, drag(page, case))
         context.close()

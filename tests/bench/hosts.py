@@ -27,7 +27,7 @@ from pathlib import Path
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-PATIENCE = 30_000
+PATIENCE = 120_000
 SETUP = """import threading, vcc
 from vcc.units import mm
 from vcc.showcase.scene import demo_scene

@@ -26,7 +26,10 @@ class Machine:
     def make(self, fineness):
         seconds = self.busy * self.took[fineness]
         self.now += seconds
-        self.pace.noted("lens", fineness, types.SimpleNamespace(seconds=seconds, planning=0.004, by_rays=False))
+        taken = types.SimpleNamespace(
+            seconds=seconds, processor=self.took[fineness], planning=0.004, by_rays=False
+        )
+        self.pace.noted("lens", fineness, taken)
 
     def drag(self, seconds):
         """What is made in a drag of so long."""
@@ -38,7 +41,7 @@ class Machine:
 
 
 QUICK = {WHOLE: 0.015, HALF: 0.008, HALF_FEW: 0.008, QUARTER: 0.006, QUARTER_FEW: 0.006}
-SLOW = {WHOLE: 0.3, HALF: 0.018, HALF_FEW: 0.018, QUARTER: 0.012, QUARTER_FEW: 0.012}
+SLOW = {WHOLE: 0.3, HALF: 0.015, HALF_FEW: 0.015, QUARTER: 0.008, QUARTER_FEW: 0.008}
 NEVER_IN_TIME = {WHOLE: 2.0, HALF: 0.090, HALF_FEW: 0.085, QUARTER: 0.072, QUARTER_FEW: 0.070}
 
 
@@ -67,8 +70,18 @@ def test_half_a_second_after_a_busy_time_images_are_as_fine_as_before(took, busy
     assert after.count(before) >= len(after) - 1
 
 
+def test_of_two_that_take_about_as_long_the_finer_is_made_whichever_a_busy_machine_delays():
+    machine = Machine(NEVER_IN_TIME)
+    machine.busy = 3.0
+    for _ in range(5):
+        machine.make(HALF)
+    machine.busy = 1.0
+    machine.make(QUARTER)
+    assert machine.drag(1)[0] == HALF
+
+
 def test_single_late_image_changes_nothing():
-    machine = Machine(QUICK)
+    machine = Machine(QUICK | {WHOLE: 0.010})
     machine.busy = 1.8
     machine.drag(0.001)
     machine.busy = 1.0
@@ -76,7 +89,7 @@ def test_single_late_image_changes_nothing():
 
 
 def test_what_is_too_slow_costs_a_tenth_of_the_time_at_most():
-    machine = Machine(SLOW | {WHOLE: 0.020})
+    machine = Machine(SLOW | {WHOLE: 0.014})
     machine.took[WHOLE] = 0.040  # from now on: it was in time once, and is worth trials
     made = machine.drag(30)
     spent = made.count(WHOLE) * (0.040 - IN_TIME)

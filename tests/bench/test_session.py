@@ -32,6 +32,7 @@ from vcc.bench.offered import Field
 from vcc.bench.picture import COARSER, WHOLE, take
 from vcc.bench.screen import codes
 from vcc.camera_file import ELEMENT_KINDS
+from vcc.fields.filling import filling_of
 from vcc.files.pictures import auto_exposure
 from vcc.plan.choice import compile_best
 from vcc.prescriptions import built_in_lenses
@@ -495,6 +496,36 @@ def test_few_rays_through_lenslets_look_at_views_with_pixels_twice_as_coarse():
     assert made.core.views == wanted.core.views == (4, 4, 12, 12)
     assert made.core.index_from_ray.isclose(wanted.core.index_from_ray)
     np.testing.assert_allclose(made.core.motion, wanted.core.motion, atol=1e-9)
+
+
+def test_views_that_were_not_recorded_are_known_in_coarse_images_and_named():
+    there = np.ones((3, 3), bool)
+    there[0, 2] = False
+    filled = filling_of(there, [0.01], [0.02])
+    recorded = noise()
+    made = vcc.LightField(recorded.values, recorded.frame, recorded.disparity_range, filling=filled)
+    field = Field(made, "")
+    assert field.with_pixels_of(4).filling == filled
+    client = Client(offered(fields={"noise": field}))
+    client.do("hello", turn=1)
+    notes, _ = client.until("notes")
+    client.close()
+    assert any(
+        "rendered from the others" in note["words"] and "(0, 2)" in note["words"] for note in notes["notes"]
+    )
+
+
+def test_a_camera_that_begins_with_glass_gets_wavelengths_and_says_so():
+    client = Client(
+        offered(start=START.changed(["elements", 0, "glass"], {"name": "catalogue", "glass": "N-BK7"}))
+    )
+    client.do("hello", turn=1)
+    remark, _ = client.until("refused")
+    assert remark["done"]
+    assert "540 nm" in remark["words"]
+    client.until("picture")
+    assert client.session.document.wavelengths == ("610 nm", "540 nm", "465 nm")
+    client.close()
 
 
 def test_a_plan_is_given_up_where_its_picture_is_no_longer_wanted(monkeypatch):

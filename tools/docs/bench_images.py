@@ -33,6 +33,8 @@ HERE = panels.DOCS / "images" / "bench"
 WIDE, HIGH = 1280, 800
 NARROW = 390
 FILMED = 960, 600
+PATIENCE = 180_000
+"""Milliseconds: on a busy machine a whole picture, and the first of a kind, take longer than Playwright waits."""
 FRAMES, FRAME_MS = 24, 90
 """Of the film, there and back."""
 
@@ -75,6 +77,7 @@ class Bench:
 
     def __init__(self, page: Shown, address: str, tables: dict[str, Any]) -> None:
         self.page = page
+        page.set_default_timeout(PATIENCE)
         document = Document(tables, "desk").as_json()
         page.goto(f"{address}#d={packed(document)}")
         self.settle()

@@ -21,7 +21,7 @@ export interface Answered<What extends Answer["what"] = Answer["what"]> {
   pictures: string[];
 }
 
-/** After so long the newest value is sent although the state of the last one has not come, milliseconds. */
+/** After so long the newest value is sent although no state of those before has come, milliseconds. */
 const PATIENCE = 150;
 /** After so long without a new value a hand that drags holds still, milliseconds. */
 const REST = 40;
@@ -86,7 +86,8 @@ export class Bench extends EventTarget {
   private selectThen: Selected = "sensor";
   private accepted: BenchDocument | null = null;
   next: { where: Where; value: Value } | null = null;
-  private underway = 0;
+  /** The newest turn whose state has come; those after it are under way. */
+  private heard = 0;
   private timer = 0;
   private addressTimer = 0;
   private remarkTimer = 0;
@@ -119,16 +120,16 @@ export class Bench extends EventTarget {
 
   // --- what is asked of the host ---
 
-  /** Change one value; while moving, only the newest is sent, when the host has taken the one before. */
+  /** Change one value; while moving, the host takes the newest of those that have come, and few are under way. */
   set(where: Where, value: Value, moving = false): void {
     if (this.document) this.document = patched(this.document, where, value);
     window.clearTimeout(this.restTimer);
     if (moving) {
       this.next = { where, value };
-      if (!this.underway) this.sendNext();
+      if (this.turn - this.heard < this.host.ahead) this.sendNext();
       this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
     } else {
-      this.next = null;
+      this.next = this.remark = null;
       this.settle();
       this.ask({ do: "set", where, value, moving: false });
     }
@@ -144,6 +145,7 @@ export class Bench extends EventTarget {
   }
 
   act(message: { do: string } & { [name: string]: unknown }, buffers?: ArrayBuffer[]): void {
+    this.remark = null; // of what was done before
     window.clearTimeout(this.restTimer);
     this.next = null;
     this.settle();
@@ -350,10 +352,9 @@ export class Bench extends EventTarget {
     }
     if (typeof this.selected === "number" && this.selected >= this.side.elements.length)
       this.selected = this.side.elements.length ? this.side.elements.length - 1 : "sensor";
-    if (message.turn >= this.underway) {
-      this.settle();
-      this.sendNext();
-    }
+    this.heard = Math.max(this.heard, message.turn);
+    window.clearTimeout(this.timer);
+    this.sendNext();
   }
 
   private hearRefused(message: Extract<FromHost, { is: "refused" }>): void {
@@ -435,9 +436,9 @@ export class Bench extends EventTarget {
     const { where, value } = this.next;
     this.next = null;
     this.ask({ do: "set", where, value, moving: true });
-    this.underway = this.turn;
+    window.clearTimeout(this.timer);
     this.timer = window.setTimeout(() => {
-      this.underway = 0;
+      this.settle();
       this.sendNext();
     }, PATIENCE);
   }
@@ -445,7 +446,7 @@ export class Bench extends EventTarget {
   /** Nothing is under way any more. */
   private settle(): void {
     window.clearTimeout(this.timer);
-    this.underway = 0;
+    this.heard = this.turn;
   }
 
   private ask(message: object, buffers?: ArrayBuffer[]): void {

@@ -54,7 +54,7 @@ function put(context: CanvasRenderingContext2D, image: ImageBitmap | HTMLCanvasE
   context.clip();
   // What has fewer pixels than the sensor is interpolated: its pixels are not those of the sensor.
   context.imageSmoothingEnabled = unit < PIXELS_SEEN || image.width < columns;
-  context.imageSmoothingQuality = layout.moving && image.width >= columns ? "low" : "high";
+  context.imageSmoothingQuality = layout.moving && 2 * image.width >= columns ? "low" : "high";
   context.drawImage(image, origin + corner.x, corner.y, columns * unit, rows * unit);
   context.restore();
 }

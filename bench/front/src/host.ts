@@ -10,6 +10,8 @@ export interface Host {
   /** What is said while it is not open, the first time and later. */
   readonly awaited: string;
   readonly lost: string;
+  /** Values of a drag that may be under way at once: it takes the newest of them. */
+  readonly ahead: number;
   /** Why the other side closed the connection, if it said so. */
   readonly why: string | null;
   /** Begins; handlers are set before. */
@@ -66,6 +68,7 @@ export class SocketHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for the server …";
   readonly lost = "The server is gone. What you see stays; the bench goes on when the server is back.";
+  readonly ahead = 8;
   why: string | null = null;
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
@@ -148,6 +151,8 @@ export class WidgetHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for Python …";
   readonly lost = "Python does not answer: it runs a cell, and then the bench goes on; or it was restarted, and then the cell of the bench is to be run again.";
+  /** A kernel answers each message by several, and a busy one keeps all of them. */
+  readonly ahead = 3;
   readonly why = null;
   private timer = 0;
   private silent = false;

@@ -31,8 +31,8 @@ export class BenchView extends Part {
   }
 
   protected override watched() {
-    const { canUndo, canRedo, open, absent, waiting, picture, refused, remark, progress, side, selected } = this.bench;
-    return [canUndo, canRedo, open, absent, waiting, picture === null, refused, remark, progress, side === null, selected];
+    const { canUndo, canRedo, open, absent, waiting, picture, without, refused, remark, progress, side, selected } = this.bench;
+    return [canUndo, canRedo, open, absent, waiting, picture === null, without, refused, remark, progress, side === null, selected];
   }
 
   private get asking(): AskingView | null {
@@ -71,7 +71,7 @@ export class BenchView extends Part {
         <vcc-bench-side .bench=${bench}></vcc-bench-side>
         ${bench.side && !bench.canUndo && !bench.canRedo ? html`<p class="quiet hint">Drag the sensor to where other rays meet, and see what becomes sharp.</p>` : nothing}
       </section>
-      <section class="picture" aria-label="Picture" aria-busy=${bench.waiting || !bench.picture}><vcc-bench-picture .bench=${bench}></vcc-bench-picture></section>
+      <section class="picture" aria-label="Picture" aria-busy=${bench.waiting || (!bench.picture && bench.without === null)}><vcc-bench-picture .bench=${bench}></vcc-bench-picture></section>
       <section class="beside" aria-label="Parts and answers"><vcc-bench-asking .bench=${bench}></vcc-bench-asking></section>
       <div class="toasts" role="status" aria-live="polite">${this.toasts()}</div>`;
   }

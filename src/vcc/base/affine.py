@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -63,6 +65,17 @@ class Affine:
         return cls(matrix)
 
     @classmethod
+    def _made(cls, matrix: NDArray[np.float64]) -> Affine:
+        """The map of a new matrix of a known shape and last row; faster, because plans make very many maps."""
+        if not math.isfinite(matrix.sum()):
+            return cls(matrix)
+        matrix.flags.writeable = False
+        found = object.__new__(cls)
+        object.__setattr__(found, "matrix", matrix)
+        return found
+
+    @classmethod
+    @functools.cache
     def identity(cls, dimensions: int = 4) -> Affine:
         """The identity on rays (4 dimensions) or points (2)."""
         return cls(np.eye(dimensions + 1))
@@ -82,7 +95,7 @@ class Affine:
         checks.plain("distance of a propagation", distance)
         matrix = np.eye(5)
         matrix[0, 2] = matrix[1, 3] = distance
-        return cls(matrix)
+        return cls._made(matrix)
 
     @classmethod
     def lens(cls, focal_length: float) -> Affine:
@@ -104,7 +117,7 @@ class Affine:
             raise InputError("a lens needs a focal length other than 0 m")
         matrix = np.eye(5)
         matrix[2, 0] = matrix[3, 1] = -1.0 / focal_length
-        return cls(matrix)
+        return cls._made(matrix)
 
     @classmethod
     def prism(cls, deflection: tuple[float, float]) -> Affine:
@@ -150,7 +163,10 @@ class Affine:
     @classmethod
     def translation(cls, *offsets: float) -> Affine:
         """x ↦ x + offsets; four offsets (u, v, s, t) make a map of rays, two a map of points."""
-        return cls.from_parts(np.eye(len(offsets)), offsets)
+        checks.plain("an affine map", offsets)
+        matrix = np.eye(len(offsets) + 1)
+        matrix[:-1, -1] = offsets
+        return cls._made(matrix) if len(offsets) in (2, 4) else cls(matrix)
 
     @classmethod
     def scaling(cls, *factors: float) -> Affine:
@@ -199,7 +215,7 @@ class Affine:
         matrix = np.eye(len(self.matrix))
         matrix[:-1, :-1] = linear = np.linalg.inv(self.linear)
         matrix[:-1, -1] = -linear @ self.offset
-        return Affine(matrix)
+        return Affine._made(matrix)
 
     def __matmul__(self, other: Affine) -> Affine:
         """This map after ``other``."""
@@ -207,7 +223,7 @@ class Affine:
             raise InputError(
                 f"a map of {self.dimensions} dimensions cannot follow one of {other.dimensions} dimensions"
             )
-        return Affine(self.matrix @ other.matrix)
+        return Affine._made(self.matrix @ other.matrix)
 
     def __call__(self, points: ArrayLike | Sequence[float]) -> NDArray[np.float64]:
         """Map rays or points, the rows of an array (…, n)."""

@@ -269,7 +269,8 @@ def _first_opening(train: Train) -> list[float]:
 
 
 def _length(value: float, digits: int = 3) -> str:
-    return units.text(float(f"{value:.{digits}g}"), "length")
+    """As text; zero in the unit that typed numbers then have."""
+    return units.text(float(f"{value:.{digits}g}"), "length") if value else "0 mm"
 
 
 _NEW: Mapping[str, Callable[[float, float], Json]] = {

@@ -41,6 +41,7 @@ class Editing:
         self.offered = offered
         self.history = History(offered.start)
         self.described = offered.start.train(offered.beside)
+        self._read = offered.start, self.described
 
     @property
     def document(self) -> Document:
@@ -51,6 +52,16 @@ class Editing:
     def train(self) -> Train:
         """Its camera."""
         return self.described.train
+
+    def train_of(self, document: Document) -> TrainAsWritten:
+        """The camera that a document describes; the newest is not read again.
+
+        Raises:
+            InputError: see `Document.train`.
+        """
+        if self._read[0] is not document:
+            self._read = document, document.train(self.offered.beside)
+        return self._read[1]
 
     def light_field(self, progress: Any = None) -> LightField:
         """The light field before the camera: the selected views, with their wavelengths, in their place."""
@@ -75,7 +86,7 @@ class Editing:
     def checked(self, document: Document) -> tuple[Document, TrainAsWritten]:
         """The document with its sensor's place as a length, and the camera; both are valid."""
         document = document.settled(self.offered.beside)
-        described = document.train(self.offered.beside)
+        described = self.train_of(document)
         field = self.offered.field(document.light_field)
         if field.is_open:
             if document.views is not None:
@@ -116,6 +127,18 @@ class Editing:
             changed = changed.changed(place, each)
         self.put(self._with_colours(changed), moving)
 
+    def add_colours(self) -> str | None:
+        """Add wavelengths to a document that needs them, which a file or an address describes; return a remark."""
+        coloured = self._with_colours(self.document)
+        if coloured is self.document:
+            return None
+        if self.history.can_undo:
+            self.put(coloured)
+        else:
+            coloured, self.described = self.checked(coloured)
+            self.history = History(coloured)
+        return f"The light field has got the wavelengths {', '.join(COLOURS)}, because an element depends on them."
+
     def _with_colours(self, document: Document) -> Document:
         """With wavelengths of red, green and blue if an element depends on them and the light field has none."""
         field = self.offered.field(document.light_field)
@@ -124,7 +147,7 @@ class Editing:
         grid = field.whole().grid
         if grid.wavelengths is not None or grid.channels != len(COLOURS):
             return document
-        depends = any(each.depends_on_band for each in document.train(self.offered.beside).elements)
+        depends = any(each.depends_on_band for each in self.train_of(document).elements)
         return replace(document, wavelengths=COLOURS) if depends else document
 
     def upload(self, message: Json, buffers: Sequence[bytes]) -> str | None:

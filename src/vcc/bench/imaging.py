@@ -230,7 +230,9 @@ class Imaging:
         far_near = vergences(field.grid, None)
         scene = None if far_near is None else (float(far_near.min()), float(far_near.max()))
         told = {item.advice: item for item in sampling_limits(train, field.grid, scene).to_watch}
-        every = [*said.values(), *(f"{item.finding}. {item.advice}" for item in told.values())]
+        filled = "" if field.filling is None else field.filling.words
+        every = [filled[:1].upper() + filled[1:]] if filled else []
+        every += [*said.values(), *(f"{item.finding}. {item.advice}" for item in told.values())]
         return [{"element": self._element_named_in(each), "words": each.replace(" um", " µm")} for each in every]
 
     def _element_named_in(self, words: str) -> int | None:

@@ -209,7 +209,8 @@ def _halved(light_field: LightField) -> LightField:
     cut = (1, 1, rows, columns)
     beyond = tuple((a // n, b // n) for (a, b), n in zip(light_field.beyond, cut, strict=True))
     frame = light_field.frame @ to_fine
-    made = LightField(coarse, frame, disparities, extent=light_field.extent, beyond=beyond)
+    filling = light_field.filling
+    made = LightField(coarse, frame, disparities, extent=light_field.extent, beyond=beyond, filling=filling)
     return made.with_wavelengths(light_field.grid.wavelengths)
 
 

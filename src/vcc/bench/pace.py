@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken
 
-IN_TIME = 0.022
-"""Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made."""
+IN_TIME = 0.015
+"""Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made. The browser of
+the same machine needs as much again for each."""
 CLOSE = 1.3
-"""A finer image is made in any case if it takes up to this times the quickest."""
+"""A finer image is made in any case if it takes up to this times the quickest, or this times its processor
+time."""
+BESIDES = 0.010
+"""Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
 """Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
 LEFT = 0.4
@@ -34,19 +39,22 @@ class _Times:
         recent: a running mean.
         planning: the part of it before the plan was ready.
         least: the shortest.
+        work: the least processor time, which a busy machine does not change.
         at: the clock at the newest.
     """
 
     recent: float
     planning: float
     least: float
+    work: float
     at: float
 
 
 class Pace:
     """Chooses the fineness of an image from the times of earlier images of the same kind of camera.
 
-    The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest. For a
+    The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the
+    clock or by the processor time that it costs with everything around it. For a
     fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
     scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
     busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
@@ -75,12 +83,13 @@ class Pace:
         now, took, planning = self._clock(), taken.seconds, taken.planning
         before = times.get(fineness)
         if before is None:
-            times[fineness] = _Times(took, planning, took, now)
+            times[fineness] = _Times(took, planning, took, taken.processor, now)
         else:
             weight = LONGER if took > before.recent else SHORTER
             before.recent += weight * (took - before.recent)
             before.planning += weight * (planning - before.planning)
-            before.least, before.at = min(before.least, took), now
+            before.least, before.work = min(before.least, took), min(before.work, taken.processor)
+            before.at = now
             if took > BUSY * before.least:
                 self._busy.add(fineness)
             elif took < FREE * before.least and fineness in self._busy:
@@ -104,7 +113,13 @@ class Pace:
             return COARSER[0]
         expected = {each: self._expected(of, each) for each in (WHOLE, *COARSER)}
         limit = max(IN_TIME, CLOSE * min(expected.values()))
-        return next(each for each, seconds in expected.items() if seconds <= limit or self._tried(of, each, limit))
+        work = {each: BESIDES + times.work for each, times in self._kept[of][1].items()}
+        close = CLOSE * work.get(min(expected, key=expected.__getitem__), 0.0)
+        return next(
+            each
+            for each, seconds in expected.items()
+            if seconds <= limit or work.get(each, math.inf) <= close or self._tried(of, each, limit)
+        )
 
     def _tried(self, of: Hashable, fineness: Fineness, limit: float) -> bool:
         """Whether a fineness that was too slow is worth another trial now."""

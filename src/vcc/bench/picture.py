@@ -90,6 +90,7 @@ class Taken(Brief):
         coarse: whether fewer pixels or rays were used.
         seconds: total time.
         planning: the part of these seconds in which plans were made.
+        processor: processor time of this program meanwhile, seconds, all threads together.
     """
 
     image: Image
@@ -98,6 +99,7 @@ class Taken(Brief):
     coarse: bool
     seconds: float
     planning: float
+    processor: float
 
     @property
     def values(self) -> Picture:
@@ -172,7 +174,7 @@ def take(
     Raises:
         InputError: the camera does not support this light field, or the electronics cannot record it.
     """
-    began = time.perf_counter()
+    began, used = time.perf_counter(), time.process_time()
     kept = kept or Parts(None if progress is None else functools.partial(progress, 0, 1))
     made = _Making(field, document, fineness, progress, kept)
     with kept.keeping():
@@ -184,8 +186,8 @@ def take(
         recording = recorded(image, exposure)
         filtered = recording.electronics.color_filter is not None
         image = recording.demosaiced("bilinear") if filtered else recording.image()
-    seconds = time.perf_counter() - began
-    return Taken(image, recording, tuple(made.runs), fineness != WHOLE, seconds, made.planning)
+    seconds, used = time.perf_counter() - began, time.process_time() - used
+    return Taken(image, recording, tuple(made.runs), fineness != WHOLE, seconds, made.planning, used)
 
 
 class _Making:

@@ -301,8 +301,11 @@ class Session:
         self._tell_state(turn_of(message), moving)
         self._wanted = Wanted(turn_of(message), moving)
         if remark is not None:
-            told = {"do": message["do"], "words": remark, "where": None, "turn": turn_of(message), "done": True}
-            self._tell("refused", told)
+            self._remark(message["do"], remark, turn_of(message))
+
+    def _remark(self, doing: str, words: str, turn: int) -> None:
+        """Say what was done besides."""
+        self._tell("refused", {"do": doing, "words": words, "where": None, "turn": turn, "done": True})
 
     def _tell_state(self, turn: int, moving: bool = False) -> None:
         document, history = self.document, self._editing.history
@@ -374,6 +377,9 @@ class Session:
                 self._opening(0, 1)
                 field.whole(self._opening)
                 self._tell_state(wanted.turn)
+            if remark := self._editing.add_colours():
+                self._tell_state(wanted.turn)
+                self._remark("set", remark, wanted.turn)
             taken = self._imaging.make(wanted)
         except (InputError, MemoryError) as error:
             self._wanted = None
@@ -382,7 +388,7 @@ class Session:
             return
         self._tell_picture(taken, wanted)
         self._wanted = replace(wanted, coarse_shown=True) if taken.coarse and not wanted.moving else None
-        if not taken.coarse and not wanted.moving:
+        if not taken.coarse and not wanted.moving and not self._inbox.supersedes(False):
             self._tell("notes", {"turn": wanted.turn, "notes": self._imaging.notes(taken)})
 
     def _tell_picture(self, taken: Taken, wanted: Wanted) -> None:

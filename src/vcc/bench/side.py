@@ -6,6 +6,7 @@ Upwards in the drawing is to the right in the scene. Infinity becomes None, beca
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, cast
@@ -21,7 +22,7 @@ from vcc.bench.snapping import snaps_of_elements, snaps_of_sensor, without_repea
 from vcc.fields.grid import Grid
 from vcc.fields.samples import InMemory
 from vcc.files.camera_reading import TrainAsWritten
-from vcc.optics import CellDeflection, Element, Faces, FirstOrder, Lens, Prism
+from vcc.optics import CellDeflection, Element, FirstOrder, Lens, Prism
 from vcc.optics.train import Train
 from vcc.plot.elements import (
     Span,
@@ -60,6 +61,8 @@ FARTHEST_DRAWN = 4
 PROFILE_POINTS = 160
 MOST_PIECES = 400
 """Pieces of a mask's pattern; the pieces of a finer pattern are averaged."""
+DRAWN = 64
+"""Shapes of elements that are kept: while one element moves, the others look the same."""
 SHARP = 0.02
 """Share of a beam: rays that come closer than this meet."""
 FARTHEST_IMAGE = 0.12
@@ -166,7 +169,7 @@ def _element(number: int, element: Element, span: Span, paths: Sequence[Paths], 
     if isinstance(element, Prism):
         prism = {"drawn": "prism", "towards": float(np.sign(element.deflection[axis]))}
         return cast(SideElement, drawn | prism)
-    return cast(SideElement, drawn | _by_faces(element, planes[0].faces, span))
+    return cast(SideElement, drawn | _by_faces(element, span))
 
 
 def _opening(element: Element, half: float, axis: int) -> Json:
@@ -175,9 +178,10 @@ def _opening(element: Element, half: float, axis: int) -> Json:
     return {"openings": [[element.z, centre - half, centre + half]] if math.isfinite(half) else []}
 
 
-def _by_faces(element: Element, faces: Faces, span: Span) -> Json:
+@functools.lru_cache(DRAWN)
+def _by_faces(element: Element, span: Span) -> Json:
     """Any thin element by its function: glass that deflects, frosted if it scatters, grey levels of a mask."""
-    axis = span.axis
+    axis, faces = span.axis, crossings(element)[0].faces
     found: Json = {"drawn": "sheet"} | _opening(element, half_opening(faces, axis), axis)
     if faces.pattern is not None:
         scale = magnification(element, faces, axis, span.low, span.high)

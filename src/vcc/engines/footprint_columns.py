@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import partial
 from typing import Any
@@ -21,6 +22,8 @@ BAND = 64
 """Largest number of image rows that a thread works on at once."""
 BAND_BYTES = 3 * 2**17
 """Largest size of their sums, which stay in the second-level cache."""
+AT_ONCE = 2**22
+"""Samples up to which a thread adds several columns of views to a band: handing over small work takes longer."""
 
 
 def bands(rows: int, height: int = BAND) -> list[tables.Band]:
@@ -67,15 +70,23 @@ class ByColumns:
         # Values in a row of samples: at least as many as kernels add at once.
         pitch = max(fine.columns, -(-SHORTEST // self.channels)) * self.channels
         divided = fine.tables(pitch) if core.refine > 1 else None
-        weights = self.footprints.weights
-        for samples, taken in blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None):
-            used = int(np.count_nonzero(weights[:, slice(*taken)]))
-            if used == 0:
-                continue
-            add = partial(self.add, samples, taken, divided, self.masks.at(taken[0], pitch), tiles)
+        pieces = blocks(core, values, bool(core.masks) or core.refine > 1 or progress is not None)
+        several = max(AT_ONCE // (len(core.view_rows) * fine.rows * pitch), 1)
+
+        def add(band: tables.Band) -> None:
+            for one in adding:
+                one(band)
+
+        while taken := list(itertools.islice(pieces, several)):
+            adding = []
+            for samples, each in taken:
+                used = int(np.count_nonzero(self.footprints.weights[:, slice(*each)]))
+                if used:
+                    masks = self.masks.at(each[0], pitch, again=several == 1)
+                    adding.append(partial(self.add, samples, each, divided, masks, tiles))
+                    done += used
             list(self.pool.map(add, bands(rows, band_height(4 * pitch))))
-            if progress is not None:
-                done += used
+            if progress is not None and adding:
                 progress(done, core.taps_used)
         return self.untiled(tiles)
 

@@ -20,6 +20,8 @@ from vcc.plan.footprints.shares import REACH, TIE, Division, Taps, taps
 
 MASK_LINES = 64
 """Lines of a mask that a thread samples at a time."""
+FEW_LINES = 2**17
+"""Values of lines below which sampling them takes less time than handing them to threads."""
 
 
 class FineGrid:
@@ -112,15 +114,16 @@ class MaskColumns:
         self.lines = np.zeros((0, 0), dtype=np.float32)
         self.pieces: list[MaskPiece] = []
 
-    def at(self, a: int, pitch: int) -> tables.MaskLines | None:
+    def at(self, a: int, pitch: int, again: bool = True) -> tables.MaskLines | None:
         """The masks' lines for the taps of column ``a``, at the columns of their samples; see the kernels.
 
         Most taps of a column sample a mask at the same columns; taps of cut cells do not. Each group of taps
-        with equal columns gets the lines that it needs. The lines are valid until the next call.
+        with equal columns gets the lines that it needs.
 
         Args:
             a: column of view taps.
             pitch: least number of values in a line.
+            again: whether to overwrite the lines of the call before; otherwise they stay valid.
         """
         core, fine = self.core, self.fine
         if not core.masks:
@@ -151,7 +154,7 @@ class MaskColumns:
                 ]
                 total += high - low
         line = pitch // self.shared
-        if self.lines.shape[0] < total:
+        if self.lines.shape[0] < total or not again:
             self.lines = aligned_buffer(total, line)
             self.lines[:] = 0  # zero beyond the samples' last column
 
@@ -160,7 +163,7 @@ class MaskColumns:
             out = self.lines[piece.to : piece.to + len(texture)]
             kernels.sample_mask_columns(texture, piece.columns, self.repeated, out)
 
-        list(self.pool.map(sample, self.pieces))
+        list((map if total * line < FEW_LINES else self.pool.map)(sample, self.pieces))
         return tables.MaskLines(self.lines, begin, self.rows, row, self.row_step, self.shared)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import inspect
 import math
 import os
@@ -194,7 +195,7 @@ def read_field(kind: type, name: str, given: Any, called: str, beside: Beside) -
         InputError: as in `read_train`.
     """
     try:
-        return _read_value(given, get_type_hints(kind)[name], unit_of(parameters_of(kind)[name]), called, beside)
+        return _read_value(given, _hints(kind)[name], unit_of(parameters_of(kind)[name]), called, beside)
     except InputError as error:
         raise InputError(as_toml(str(error))) from error.__cause__
 
@@ -341,11 +342,17 @@ def check_keys(
             raise InputError(f'{place} has no {noun} "{key}", which it needs')
 
 
+@functools.cache
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of a class's fields, resolved: slow in Python."""
+    return get_type_hints(kind)
+
+
 def _build(kind: type, given: Mapping[str, Any], place: str, beside: Beside) -> Any:
     """Build an object of a dataclass from the fields of a table."""
     fields = parameters_of(kind)
     check_keys(given, fields, [name for name in fields if needed(fields[name])], place, "field")
-    hints = get_type_hints(kind)
+    hints = _hints(kind)
     values = {
         name: _read_value(value, hints[name], unit_of(fields[name]), f"{place}: {name}", beside)
         for name, value in given.items()

@@ -223,6 +223,8 @@ def _distance(start: float, end: float) -> float:
 def about(middle: tuple[float, float], ray_map: Affine) -> Affine:
     """A map of rays in coordinates centred on ``middle``, converted to the camera's coordinates."""
     x, y = middle
+    if x == 0 == y:
+        return ray_map
     return Affine.translation(x, y, 0, 0) @ ray_map @ Affine.translation(-x, -y, 0, 0)
 
 
@@ -286,10 +288,16 @@ class Train(Value, Shown):
 
     @property
     @cached
+    def met(self) -> tuple[tuple[Element, tuple[Part, ...]], ...]:
+        """Elements with the parts that light meets in turn; see `met_in_order`."""
+        return tuple(met_in_order(self.elements))
+
+    @property
+    @cached
     def _path(self) -> tuple[tuple[Stage, ...], Affine]:
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
-        for element, parts in met_in_order((*self.elements, *self._pixels)):
+        for element, parts in (*self.met, *met_in_order(self._pixels)):
             if isinstance(element, TRACED):
                 behind = self._behind(element)
                 if any(isinstance(later, TRACED) for later in behind):
@@ -480,7 +488,7 @@ class Train(Value, Shown):
         if checks.finite("z", z, "metres") < 0:
             raise InputError(f"z = {z * 1e3:g} mm lies before the entrance plane of the camera")
         ray, here = Affine.identity(), 0.0
-        for element in self.elements:
+        for element, parts in self.met:
             here_too = touch(element.z, z)
             if (here_too and before) or (element.z > z and not here_too):
                 break
@@ -490,7 +498,7 @@ class Train(Value, Shown):
                 )
             ray = Affine.propagation(_distance(here, element.z)) @ ray
             here = element.z + element.length
-            for part in element.parts():
+            for part in parts:
                 step = part if isinstance(part, Affine) else part.affine
                 if step is not None:
                     ray = about(element.decentre, step) @ ray

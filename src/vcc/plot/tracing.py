@@ -13,7 +13,7 @@ from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.optics import Element, Faces, RealLens, Scatter
 from vcc.optics.faces import Part
-from vcc.optics.train import Stage, Train, about, met_in_order
+from vcc.optics.train import Stage, Train, about
 from vcc.shapes.kernels import Kernel
 
 Array = NDArray[np.float64]
@@ -111,7 +111,7 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
     bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [], [])
     bundle.cross(start, Affine.propagation(start)(given)[:, :2])
     here = 0.0
-    for element, parts in met_in_order(camera.elements):
+    for element, parts in camera.met:
         bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
         here = element.z + element.length
         if isinstance(element, RealLens):

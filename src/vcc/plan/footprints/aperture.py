@@ -92,8 +92,11 @@ class Aperture(Brief):
             "what is open of views",
             lambda: content(
                 (
-                    [(plane.pattern, plane.at_index, plane.offset) for plane in self.planes],
-                    (self.taps.index, self.taps.shift, self.motion, self.samples),
+                    [
+                        (each.pattern, each.at_index, each.offset, each.view_step(self.motion))
+                        for each in self.planes
+                    ],
+                    (self.taps.index, self.taps.shift, self.samples),
                 )
             ),
             self._open_parts,

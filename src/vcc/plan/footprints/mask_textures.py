@@ -520,9 +520,10 @@ def _given_back(frequency: Array) -> Array:
 def _filtered(means: NDArray[np.floating], filters: tuple[Array, ...]) -> NDArray[np.floating]:
     """Means (rows, columns) filtered, without the margin that the filters consume."""
     from scipy.ndimage import convolve1d
-    from scipy.signal import oaconvolve
 
     if len(filters) == 1:
+        from scipy.signal import oaconvolve  # slow to import
+
         return np.ascontiguousarray(oaconvolve(means, filters[0].astype(means.dtype), mode="valid"))
     (across, down) = filters
     down_done = convolve1d(means, down, axis=0, mode="constant")[len(down) // 2 : len(means) - len(down) // 2]
