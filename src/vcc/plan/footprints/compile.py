@@ -115,6 +115,8 @@ def blurs_or_why_not(
     for stage in train.stages:
         if stage.faces.bending is not None:
             return f"{stage.element.label} bends rays by a function of position that is not affine"
+        if stage.faces.by_ray is not None:
+            return f"{stage.element.label} transmits by a function of place and slope"
         if stage.term is not None and stage.term.mixes:
             return f"{stage.element.label} depends on place and slope along one axis at once"
     blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", kernels)
