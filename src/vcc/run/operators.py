@@ -161,6 +161,11 @@ def masked(light_field: Field, mask: Mask, memory_limit: int | None = None) -> F
 
 def scattered(light_field: Field, diffuser: Element, memory_limit: int | None = None) -> Field:
     """The paper's convolution L ⊗ D; see `vcc.LightField.scattered`."""
+    if diffuser.depends_on_band:
+        raise InputError(
+            f"{diffuser.label} scatters each wavelength otherwise, and light_field.scattered treats all channels "
+            "alike: scatter channel by channel with diffusers without a glass, or put it in a vcc.Camera"
+        )
     faces = diffuser.faces()
     if faces.spread is None:
         raise InputError(f"{diffuser.label} does not scatter light: its faces have no kernel")
