@@ -102,3 +102,11 @@ def test_damaged_ome_xml_raises(tmp_path):
         file.write_bytes(file.read_bytes().replace(b"<Pixels", b"<Pi<els", 1))
     with pytest.raises(vcc.InputError, match=r"view_00_00\.tif"):
         vcc.open_light_field(tmp_path, **CAMERAS)
+
+
+def test_a_damaged_view_is_named(tmp_path):
+    for column in range(2):
+        write_exr(tmp_path / f"view_00_0{column}.exr", NAMES, BANDS[0, 0])
+    (tmp_path / "view_00_01.exr").write_bytes(b"no picture")
+    with pytest.raises(vcc.InputError, match=r"view_00_01\.exr cannot be read as a picture"):
+        vcc.open_light_field(tmp_path, **CAMERAS)

@@ -86,7 +86,7 @@ def wavelengths_in(path: Path) -> tuple[float, ...] | None:
         path: a picture that can be read.
 
     Raises:
-        InputError: damaged metadata, named with the file.
+        InputError: a damaged file, or damaged metadata.
     """
     ending = path.suffix.lower()
     try:
@@ -103,4 +103,6 @@ def wavelengths_in(path: Path) -> tuple[float, ...] | None:
             return None if text is None else emission_wavelengths(text)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+    except Exception as error:  # each library has its own exceptions for damaged files
+        raise InputError(f"{path} cannot be read as a picture ({str(error)[:200]})") from error
     return None
