@@ -306,7 +306,7 @@ def divide_samples(
 
     The light of a sample, weighted by the mask, lands on the pixels as one footprint. Mask detail that survives
     the aperture's penumbra but would be blurred by the footprint needs finer samples. The sharpening filter
-    removes nearly all of the error if the detail is smooth; it cannot at hard edges.
+    removes nearly all of the error if the detail is smooth, as in soft shadows; it cannot at hard edges.
 
     Args:
         planes: masks in mid-path.
@@ -323,12 +323,14 @@ def divide_samples(
         sample = np.abs(plane.sample_step).sum(axis=1) / parts
         penumbra = geometry.penumbra(plane)
         lost = max(detail.lost(plane, penumbra, sample), 0.0)
-        if has_edges(plane.pattern):
-            return SampleDivision(parts, SPILT * math.sqrt(lost) * size / parts, bool((penumbra < sample).any()))
-        if math.sqrt(lost) <= ERROR:
-            return SampleDivision(parts, 0.0, False)
-        sharp = max(detail.lost(plane, np.zeros(2), sample), 0.0)
-        return SampleDivision(parts, math.sqrt(lost) * min(SMOOTH * sharp**2, 1.0), False)
+        hard = has_edges(plane.pattern)
+        touching = hard and bool((penumbra < sample).any())
+        error = math.sqrt(lost) * (SPILT * size / parts if hard else 1.0)
+        if not touching and error > ERROR:  # the filter gives back what is lost of smooth shadows
+            error *= min(SMOOTH * max(detail.lost(plane, np.zeros(2), sample), 0.0) ** 2, 1.0)
+        elif not hard:
+            error = 0.0
+        return SampleDivision(parts, error, touching)
 
     if refine == 1 or not planes:
         return SampleDivision(geometry.parts, 0.0, False)
