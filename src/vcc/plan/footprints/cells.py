@@ -326,7 +326,7 @@ def divide_samples(
         hard = has_edges(plane.pattern)
         touching = hard and bool((penumbra < sample).any())
         error = math.sqrt(lost) * (SPILT * size / parts if hard else 1.0)
-        if not touching and error > ERROR:  # the filter gives back what is lost of smooth shadows
+        if not touching and error > ERROR:  # the filter compensates the loss of smooth shadows
             error *= min(SMOOTH * max(detail.lost(plane, np.zeros(2), sample), 0.0) ** 2, 1.0)
         elif not hard:
             error = 0.0
