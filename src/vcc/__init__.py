@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from vcc.optics import Prism as Prism
     from vcc.optics import PrismArray as PrismArray
     from vcc.optics import Pyramid as Pyramid
+    from vcc.optics import RayFilter as RayFilter
     from vcc.optics import RayTable as RayTable
     from vcc.optics import RayTableLens as RayTableLens
     from vcc.optics import RealLens as RealLens
@@ -85,6 +86,7 @@ _HOMES = {
     "Prism": "vcc.optics",
     "PrismArray": "vcc.optics",
     "Pyramid": "vcc.optics",
+    "RayFilter": "vcc.optics",
     "Recording": "vcc.recording",
     "ResultWarning": "vcc.base.errors",
     "Sensor": "vcc.optics.sensor",

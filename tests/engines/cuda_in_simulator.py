@@ -229,15 +229,19 @@ def test_an_operator_and_its_adjoint():
     assert abs(ahead - back) < 1e-5 * abs(ahead)
 
 
-@pytest.mark.parametrize("louvre", [False, True])
-def test_terms_of_direction_and_bands(louvre):
+@pytest.mark.parametrize("kind", ["fringes", "louvre", "function"])
+def test_terms_of_direction_and_bands(kind):
     glass = vcc.glasses.Cauchy(1.5046, 0.0042e-12)
     fringes = vcc.AngleFilter(vcc.patterns.AngularFringes(30, 0.4, 0.8), z=48.5 * mm)
     walls = vcc.Louvre(3 * mm, 9 * mm, 0.3 * mm, 0.4, z=20 * mm)
+    mixed = vcc.RayFilter(lambda x, y, s, t: 1 / (1 + (2e3 * x * s + 400 * y + 9 * t) ** 2), z=48 * mm)
     lens = vcc.Lens(50 * mm, 7 * mm, glass=glass)
-    camera = vcc.Camera([lens, walls if louvre else fringes], replace(SMALL, shape=(2, 3), response=((0.3, 0.8),)))
+    camera = vcc.Camera(
+        [lens, {"fringes": fringes, "louvre": walls, "function": mixed}[kind]],
+        replace(SMALL, shape=(2, 3), response=((0.3, 0.8),)),
+    )
     lf = field(samples((2, 2, 3, 4, 2))).with_wavelengths((450e-9, 650e-9))
-    options = {"samples": 16} if louvre else {"refine": 1}
+    options = {"refine": 1} if kind == "fringes" else {"samples": 16}
     expected = assert_agree(camera, lf, **options)
     np.testing.assert_allclose(camera.capture(lf.on_gpu(), **options).values, expected, rtol=1e-6)
 

@@ -61,6 +61,11 @@ OWN = {
         ),
         vcc.Mask(patterns.CosineSum((1 * mm, 0.7 * mm), 2, 0.3), z=20 * mm),
     ),
+    "place and slope": _lens_and(
+        vcc.RayFilter(
+            lambda x, y, s, t: 1 / (1 + (2e3 * x * s + 400 * y + 9 * t) ** 2), z=49 * mm, decentre=(1e-4, 0)
+        )
+    ),
     "zeros and cosines": _lens_and(
         vcc.Mask(patterns.Cells(np.rint(RANDOM.random((6, 5))), 4 * mm), z=20 * mm, decentre=(0.1 * mm, 0.0)),
         vcc.Mask(patterns.CosineSum((1 * mm, np.inf)), z=30 * mm),
@@ -94,7 +99,9 @@ def _double(core):
     """The same core with tables in double precision, so that small steps in them are exact."""
 
     def doubled(step):
-        named = {n: getattr(step, n, None) for n in ("values", "texture", "cumulative", "width")}
+        named = {
+            n: getattr(step, n, None) for n in ("values", "texture", "cumulative", "width", "by_place", "by_slope")
+        }
         wide = {
             n: value.astype(float) if isinstance(value, np.ndarray) else doubled(value)
             for n, value in named.items()

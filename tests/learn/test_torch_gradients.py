@@ -71,6 +71,12 @@ def test_by_footprints(kind):
     check(camera, [name for name in own if verdict(camera, FIELD.grid, name, how).kind == "exact"], how=how)
 
 
+def test_by_rays_through_a_function_of_place_and_slope():
+    seeing = vcc.RayFilter(lambda x, y, s, t: 0.5 + 0.4 * np.sin(3e4 * x * s + 900 * y), z=40 * mm, name="filter")
+    camera = vcc.Camera([LENS, seeing], SENSOR)
+    check(camera, ["main.focal_length", "filter.z", "filter.decentre"], samples=16)
+
+
 def test_by_footprints_lens_and_sensor():
     camera = camera_with("prism")
     check(camera, [name for name in names(camera) if name.split(".")[0] in ("main", "sensor")], refine=1)

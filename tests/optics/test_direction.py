@@ -104,7 +104,7 @@ def test_terms_of_other_forms_raise(of, message):
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        (lambda: vcc.Faces(transmission=lambda x, y, s, t: x), r"function of two numbers.*vcc\.Term"),
+        (lambda: vcc.Faces(transmission=lambda x, y, s: x), r"function of two numbers.*vcc\.RayFilter"),
         (lambda: vcc.Faces(terms=(patterns.Circle(1.0),)), r"vcc\.Term objects"),
         (lambda: vcc.AngleFilter(np.ones((3, 3))), r"Cells\(array, width=2"),
         (lambda: vcc.Louvre(1 * mm, 1 * mm, 1 * mm), "thinner than the pitch"),

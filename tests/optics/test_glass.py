@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import vcc
+from vcc import kernels
 from vcc.base.units import mm, nm, um
 
 F, D, C = 486.1327 * nm, 587.5618 * nm, 656.2725 * nm
@@ -161,3 +162,32 @@ def test_elements_of_glass_are_values_and_say_what_they_are_of():
     camera = vcc.Camera([GLASS], SENSOR)
     assert hash(camera) == hash(vcc.Camera([GLASS], SENSOR))
     assert "glass" in camera.elements[0].described()
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    [
+        kernels.Gaussian((0.02, 0.01)),
+        kernels.TopHat(0.03, "square"),
+        kernels.Radial((0.0, 0.01, 0.02), (1.0, 0.6, 0.0), normalise=True),
+        kernels.Samples(np.random.default_rng(0).random((3, 5)), 0.004, normalise=True),
+    ],
+)
+def test_a_surface_relief_scatters_by_the_index_less_one(kernel):
+    """A facet of slope σ deflects by (n − 1)·σ: all changes of slope grow alike, densities fall as the square."""
+    glass, sensor = vcc.glasses.Cauchy(1.5, 0.004 * um**2), vcc.Sensor(z=50 * mm, shape=(4, 4), pitch=1 * mm)
+    coded = vcc.CodedDiffuser(kernel, 9 * mm, widths=np.ones((3, 3)), glass=glass, z=1 * mm)
+    camera = vcc.Camera([vcc.Diffuser(kernel, glass=glass), coded], sensor).at_wavelength(440 * nm)
+    factor = (0.5 + 0.004 / 0.44**2) / (0.5 + 0.004 / 0.5875618**2)
+    for found in (camera.elements[0].kernel, camera.elements[1].kernels[0]):
+        s, t = np.random.default_rng(1).uniform(-0.03, 0.03, (2, 50))
+        np.testing.assert_allclose(
+            found.density(factor * s, factor * t) * factor**2, kernel.density(s, t), rtol=1e-9
+        )
+        np.testing.assert_allclose(found.reach, np.multiply(kernel.reach, factor))
+
+
+def test_a_light_field_is_not_scattered_by_one_kernel_for_all_bands():
+    field = vcc.LightField.from_views(np.ones((2, 2, 4, 4)), 1 * mm, 1e-2, 1.0)
+    with pytest.raises(vcc.InputError, match=r"each wavelength otherwise.*vcc\.Camera"):
+        field.scattered(vcc.Diffuser(kernels.Gaussian(0.02), glass=vcc.glasses.Abbe(1.5, 60)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -241,3 +242,25 @@ def test_a_lens_of_glass_fringes_and_photodiodes_together():
         assert decibels(image[0][0].to_numpy()[..., n], truth) > 50
         truth = summed(plain, fringes, scene, across=96) - truth
         assert decibels(image[0][1].to_numpy()[..., n], truth) > 50
+
+
+def test_edges_of_light_within_pixels_that_a_mask_divides_are_warned_of():
+    """The mean of mask times light in a pixel is estimated from its neighbours: not where light jumps in it."""
+    half = vcc.AngleFilter(patterns.Cells(np.array([[1.0, 0.0]]), width=0.4))
+    cell = 6.2 * mm / 14
+    cells = vcc.Mask(np.indices((14, 14)).sum(axis=0) % 2.0, width=14 * cell, z=54 * mm)
+    camera = vcc.Camera([vcc.Lens(50 * mm, diameter=3 * mm), half, cells], sensor())
+    warned = r"angle filter.*sharp on the sensor, and mask.*varies within pixels.*wrong by up to ([\d.]+)%.*rays"
+    with pytest.warns(vcc.ResultWarning, match=warned) as found:
+        image = camera.capture(textured_field()).to_numpy()
+    stated = float(re.search(warned, str(found[0].message))[1]) / 100
+
+    def lit(rays):
+        return rays[..., 2] + (rays[..., 0] - 54 * mm * rays[..., 2]) / (50 * mm) < 0  # slopes before the lens
+
+    def passes(rays):
+        return lit(rays) * ((np.floor(rays[..., 0] / cell) + np.floor(rays[..., 1] / cell)) % 2)
+
+    error = np.abs(image - summed(camera, passes, scene, across=40, pixel=12)).max()
+    light = summed(camera, lambda rays: 1.0, scene, across=20).max()
+    assert 0.2 * stated < error / light < stated

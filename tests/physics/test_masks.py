@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import j1
 from scipy.stats import qmc
 
 import vcc
@@ -156,6 +157,25 @@ def test_a_mask_near_the_sensor_tends_to_the_mask_against_it(light_field):
     light = capture([LENS], light_field, PICTURE).max()
     assert np.abs(near - against).max() < (loss + moved) * light
     assert np.abs(near - against).max() > 0.1 * (loss + moved) * light  # the gap is seen
+
+
+def test_a_mask_finer_than_samples_before_the_sensor_is_seen_through_the_stop_alone():
+    """A closed form, where the grid of views is twice as wide as the stop and samples are wider than pixels.
+
+    Through a stop of diameter D, at a gap g, a cosine of period P has 2J₁(x)/x of its amplitude, x = πDg/(dP), and
+    its shadow's period is P/(1 − g/d); a pixel takes the mean.
+    """
+    period, gap, stop, pixel = 0.1 * mm, 1.3 * mm, 8 * mm, 0.04 * mm
+    even = vcc.LightField.from_views(np.ones((17, 17, 30, 30), np.float32), 0.95 * mm, 1e-3, 1.3)
+    sensor = vcc.Sensor(z=52 * mm, shape=(8, 10), pitch=pixel)
+    mask = vcc.Mask(CosineSum((period, np.inf), 1, 0.3), z=52 * mm - gap)
+    image = capture([vcc.Lens(50 * mm, stop), mask], even, sensor)
+    x, shrunk = np.pi * stop * gap / (52 * mm) / period, 1 - gap / (52 * mm)
+    seen = 2 * j1(x) / x * np.sinc(pixel * shrunk / period)
+    shadow = 0.5 + 0.5 * seen * np.cos(2 * np.pi * sensor.column_places * shrunk / period + 0.3)
+    truth = np.pi * (stop / 2) ** 2 / (52 * mm) ** 2 * np.broadcast_to(shadow, sensor.shape)
+    assert psnr(image, truth) > 55  # the mark of one mask; it was 35 by the penumbra of the whole grid
+    assert np.ptp(truth) > 0.05 * truth.max()
 
 
 # -- at the lens

@@ -318,6 +318,23 @@ def test_what_a_place_of_the_sensor_sees_of_a_plane():
     np.testing.assert_allclose(found, np.abs(AT_INDEX[:, :2]) @ [4, 3], rtol=1e-9)
 
 
+def test_stops_bound_what_a_place_of_the_sensor_sees():
+    """A stop at the views, 2 views wide and round, counts as a square of √3 views: of 4 and 3."""
+    at_views, corners = np.diag([1.0, 1.0, 0.0, 0.0])[:2], []
+    for i, j in itertools.product((-math.sqrt(3) / 2, math.sqrt(3) / 2), repeat=2):
+        sample = np.linalg.solve(ON_SENSOR[:, 2:], -ON_SENSOR[:, :2] @ [i, j])
+        corners.append(AT_INDEX @ [i, j, *sample])
+    plane, stop, wide = (
+        plane_of(AT_INDEX),
+        plane_of(at_views, (0, 0), Circle(2.0)),
+        plane_of(at_views, (0, 0), Circle(9.0)),
+    )
+    np.testing.assert_allclose(
+        geometry(stops=(plane, wide, stop)).penumbra(plane), np.ptp(corners, axis=0), rtol=1e-9
+    )
+    np.testing.assert_allclose(geometry(stops=(wide,)).penumbra(plane), geometry().penumbra(plane))
+
+
 def test_views_in_which_a_pattern_varies():
     """A disc that holds some views' cells, cuts others and misses the rest: by places all over each cell."""
     at_index = np.diag([1.0, 1.0, 0.0, 0.0])[:2]

@@ -119,7 +119,8 @@ def _what(train: Train, grid: Grid) -> str:
 def _by_direction(train: Train) -> list[str]:
     """What depends on the direction of light, and how photodiodes share it."""
     notes = []
-    labels = dict.fromkeys(stage.element.label for stage in train.stages if stage.term is not None)
+    stages = [each for each in train.stages if each.term is not None or each.faces.by_ray is not None]
+    labels = dict.fromkeys(stage.element.label for stage in stages)
     if labels:
         notes.append(f"transmission that depends on direction: {', '.join(labels)}")
     rows, columns = train.sensor.photodiodes

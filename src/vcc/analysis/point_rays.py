@@ -139,6 +139,8 @@ class PointRays:
             rays = stage.approach(rays)
             if stage.faces.pattern is not None:
                 share = share * _mean_transmission(stage, rays)
+            if stage.faces.by_ray is not None:
+                share = share * stage.share(rays[0])
             rays, light = stage.crossed(rays)
             share = share * light[0]
             lost |= (light[1:] == 0).any(axis=0)
@@ -166,9 +168,7 @@ class PointRays:
         for stage in stages:
             bundle = stage.approach(bundle)
             x, y = (bundle[:, :2] - stage.element.decentre).T
-            if stage.faces.pattern is not None:
-                with stage.named():
-                    share = share * np.asarray(stage.faces.pattern(x, y), dtype=np.float64)
+            share = share * stage.share(bundle)
             bundle, light = stage.crossed(bundle)
             share = share * light
             if stage.faces.spread is not None:

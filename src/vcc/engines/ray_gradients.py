@@ -216,6 +216,9 @@ def _of_step(step: steps.Step, whole: list[int], gradients: tables.RayGradients,
             return _of_texture("texture", texture, own, gradients.slopes[whole[2] :])
         case steps.TextureShares(texture):
             return _of_texture("texture", texture, own, gradients.shares[whole[2] :])
+        case steps.SharesByRay(by_place, by_slope):
+            at_place = _of_texture("by_place", by_place, own, gradients.shares[whole[2] :])
+            return at_place | _of_texture("by_slope", by_slope, own[4:], gradients.shares[whole[5] :])
         case steps.CellShares(values) if gradients.shares.size:
             return {"values": gradients.shares[whole[2] :][: values.size]}
         case steps.Cosines():

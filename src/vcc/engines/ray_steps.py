@@ -91,6 +91,16 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     )
 
 
+@_inner
+def by_ray(table, a, f, x, y, s, t):  # type: ignore[no-untyped-def]
+    """Step 16: the sum of products of a function of place and one of slope."""
+    there, towards = corner(x, y, a[0], a[1], f), corner(s, t, a[3], a[4], f[4:])
+    total = 0.0
+    for k in range(a[6]):
+        total += mixed(table, a[2], a[6], k, there) * mixed(table, a[5], a[6], k, towards)
+    return total
+
+
 @_inlined
 def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
     """Step 0: an affine map along x and another along y."""
@@ -241,6 +251,9 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
             through_surface(a, f, n, x, y, s, t, share)
         elif code == 15:
             through_map(a, f, slopes[a[3] :], n, x, y, s, t, share)
+        elif code == 16:
+            for p in range(n):
+                share[p] *= max(by_ray(shares, a, f, x[p], y[p], s[p], t[p]), 0.0)
         elif code == 14:
             for p in range(n):
                 per_square = 1.0 / (1.0 + s[p] * s[p] + t[p] * t[p])
@@ -434,6 +447,24 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             found[0, p] = gw[p] * share[p]
             gw[p] *= mixed(shares, a[2], 1, 0, corner(x[p], y[p], a[0], a[1], f))
         texture_back(shares, (n, a[0], a[1], a[2], 1), f, (x, y, gx, gy), found[:1], out_shares, own)
+    elif code == 16:
+        terms, own_slopes = a[6], own[4:]
+        for k in range(terms):
+            for p in range(n):
+                carried = gw[p] * share[p]
+                if by_ray(shares, a, f, x[p], y[p], before[2, p], before[3, p]) <= 0.0:
+                    carried = 0.0
+                found[0, p] = carried * mixed(
+                    shares, a[5], terms, k, corner(before[2, p], before[3, p], a[3], a[4], f[4:])
+                )
+                found[1, p] = carried * mixed(shares, a[2], terms, k, corner(x[p], y[p], a[0], a[1], f))
+            to_place, to_slope = (n, a[0], a[1], a[2] + k, terms), (n, a[3], a[4], a[5] + k, terms)
+            texture_back(shares, to_place, f, (x, y, gx, gy), found[:1], out_shares, own)
+            texture_back(
+                shares, to_slope, f[4:], (before[2], before[3], gs, gt), found[1:2], out_shares, own_slopes
+            )
+        for p in range(n):
+            gw[p] *= max(by_ray(shares, a, f, x[p], y[p], before[2, p], before[3, p]), 0.0)
     elif code == 12:
         for p in range(n):
             cosines_x, steep_x = cosines(f[2], f[0], f[4], a[0], x[p])

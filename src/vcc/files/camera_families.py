@@ -43,6 +43,7 @@ def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
 
 ELEMENT_KINDS: dict[str, type[Element]] = dict(sorted(_named(Element, optics).items()))
 """The class of each ``kind`` in a camera file. Add your own classes to read and write them."""
+del ELEMENT_KINDS["ray_filter"]  # a Python function, which a file cannot store
 
 PATTERN_NAMES: dict[str, type[Pattern]] = _named(Pattern, patterns, lattice, directional, by_channel) | {
     "product": Product

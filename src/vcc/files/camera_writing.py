@@ -36,7 +36,7 @@ from vcc.files.camera_families import (
 from vcc.files.camera_reading import Beside, read_array
 from vcc.files.npy import write_npy
 from vcc.files.parts import stem_and_ending
-from vcc.optics import Element
+from vcc.optics import Element, RayFilter
 from vcc.optics.train import Train
 from vcc.shapes import patterns
 from vcc.shapes.patterns import Cells, Pattern
@@ -103,6 +103,11 @@ def _write_element(
             writer = Writer(file, element.label, slug, arrays)
             form = FROM_FILES[kind].of(element, file.parent) if kind in FROM_FILES else None
             return {"kind": name, **writer.table_of(form or element)}
+    if isinstance(element, RayFilter):
+        raise InputError(
+            f"{element.label} cannot be written to {file.name}: its {element.described()} is a piece of Python "
+            "that a camera file cannot hold. Keep the program that makes this camera"
+        )
     raise InputError(
         f"{element.label} cannot be written to {file.name}: camera files support "
         f"{listed(ELEMENT_KINDS)}. Add its class to vcc.camera_file.ELEMENT_KINDS, "

@@ -19,6 +19,7 @@ from vcc.files import jpeg_headers
 from vcc.files.declared_sizes import check_declared_size
 from vcc.files.netpbm import read_netpbm
 from vcc.files.npy import read_npy
+from vcc.files.spectral import bands_of, ome
 
 NOT_OPAQUE = (
     "this picture is not opaque everywhere, and its background is unknown: flatten it (remove its alpha channel)"
@@ -132,6 +133,8 @@ def _read_tiff(path: Path) -> NDArray[Any]:
     import tifffile
 
     with tifffile.TiffFile(path) as file:
+        if file.is_ome and len(file.pages) > 1:
+            return _read_ome(file, path)
         if len(file.pages) != 1:
             raise Unsuitable(f"this TIFF holds {len(file.pages)} pictures; only one is supported")
         page = file.pages.first
@@ -146,6 +149,28 @@ def _read_tiff(path: Path) -> NDArray[Any]:
         if samples.ndim == 3 and page.planarconfig == tifffile.PLANARCONFIG.SEPARATE:
             samples = np.moveaxis(samples, 0, -1)
     return samples
+
+
+def _read_ome(file: Any, path: Path) -> NDArray[Any]:
+    """The channels of an OME-TIFF with a page for each; other files that it may name are not opened."""
+    sizes = [
+        {axis: int(one.get(f"Size{axis}", "0")) for axis in "ZCT"} for one in ome(file.ome_metadata, "Pixels")
+    ]
+    count = len(file.pages)
+    if sizes != [{"Z": 1, "C": count, "T": 1}]:
+        raise Unsuitable(
+            f"this OME-TIFF holds {count} pictures of {str(sizes)[:80]}: only one with a picture for each channel "
+            "is supported"
+        )
+    first = file.pages.first
+    check_declared_size(count * math.prod(first.shaped) * first.dtype.itemsize, path.stat().st_size, "it")
+    planes = []
+    for page in file.pages:
+        if len(page.shape) != 2 or (page.shape, page.dtype) != (first.shape, first.dtype):
+            raise Unsuitable("the channels of this OME-TIFF differ in size or type")
+        _check_tiff(page, path)
+        planes.append(page.asarray())
+    return np.stack(planes, axis=-1)
 
 
 def _check_tiff(page: Any, path: Path) -> None:
@@ -193,7 +218,9 @@ def _read_bmp(path: Path) -> NDArray[Any]:
 
 def _read_exr(path: Path) -> NDArray[Any]:
     channels = read_exr_channels(path)
-    if {"R", "G", "B"} <= channels.keys():
+    if bands := bands_of(channels):
+        picked = [channels[name] for name in bands]
+    elif {"R", "G", "B"} <= channels.keys():
         picked = [channels[name] for name in "RGB"]
     elif len(channels) == 1:
         picked = list(channels.values())
@@ -202,7 +229,7 @@ def _read_exr(path: Path) -> NDArray[Any]:
     else:
         raise Unsuitable(
             f"this OpenEXR file has the channels {', '.join(sorted(channels))[:200]}; "
-            "R, G, B or a single one is wanted"
+            "R, G, B, bands such as S0.550nm, or a single one is wanted"
         )
     alpha = channels.get("A")
     if alpha is not None and not (alpha >= 1).all():

@@ -20,6 +20,7 @@ from vcc.files.atomic import said_by_disk
 from vcc.files.destination import Destination, Target
 from vcc.files.image_metadata import ImageMetadata, in_png, metadata_of, tiff_tags, write_npy
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
+from vcc.files.spectral import wavelengths_in
 
 READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
 """Extensions that `read_picture` supports."""
@@ -43,7 +44,8 @@ def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
     Supports PNG of 8 and 16 bits, JPEG of 8 bits, TIFF, BMP, OpenEXR, Netpbm and NumPy's .npy. Palettes are
     converted to colours. PNGs of 1, 2 or 4 bits are scaled to 8 (1-bit: 0 and 255), Netpbm of 10 bits to 16. A
     fully opaque alpha channel is dropped; any other raises, because the background is unknown. OpenEXR returns
-    the channels R, G, B, or the only channel.
+    the bands of spectral files (``S0.550nm``, shortest first), else the channels R, G, B, or the only channel.
+    OME-TIFF may have a page for each channel.
 
     Returns:
         The samples, shape (rows, columns) or (rows, columns, channels), uint8, uint16 or float32,
@@ -459,7 +461,8 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
             f"{path} holds an array of shape {samples.shape}; a picture has rows and columns, "
             "and perhaps channels last"
         )
-    if path.suffix.lower() != ".npy" and samples.ndim == 3 and samples.shape[2] in (2, 4):
+    several = path.suffix.lower() not in (".npy", ".exr") and samples.ndim == 3 and samples.shape[2] in (2, 4)
+    if several and wavelengths_in(path) is None:
         opaque = 1 if samples.dtype.kind == "f" else np.iinfo(samples.dtype).max
         if not (samples[..., -1] >= opaque).all():
             raise InputError(f"{path}: {NOT_OPAQUE}")

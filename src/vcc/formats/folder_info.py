@@ -11,8 +11,10 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.wavelengths import as_text
 from vcc.fields.grid import Sample, pair
 from vcc.files.pictures import read_picture
+from vcc.files.spectral import wavelengths_in
 from vcc.formats.cameras import Cameras, Pair
 from vcc.formats.grid import DEFAULT_SPACING, Decoded, Geometry, ViewGrid
 from vcc.formats.hci import parameters_file
@@ -106,9 +108,31 @@ def info_of_grid(grid: ViewGrid) -> FolderInfo:
             "pictures were cropped or scaled, sensor_size_mm, disp_min and disp_max)"
         )
     info = _info(grid.format, grid.shape, first.shape, bits, grid.geometry)
+    info = replace(info, wavelengths=_wavelengths(grid))
     said = ViewsWithMetadata.of(grid.present.values())
     transfer = said.transfer or info.transfer
     return replace(info, files=grid.files, missing=grid.missing, transfer=transfer, metadata=said)
+
+
+def _wavelengths(grid: ViewGrid) -> tuple[float, ...] | None:
+    """The wavelengths that pictures state for their channels, or those of ``parameters.cfg``.
+
+    Raises:
+        InputError: pictures that state different ones.
+    """
+    some, *others = grid.present.values()
+    known, source = grid.geometry.wavelengths, parameters_file(some.parent)
+    if (stated := wavelengths_in(some)) is None:
+        return known
+    if known is None:
+        known, source = stated, some
+    for file in (some, *others):
+        if (found := wavelengths_in(file)) != known:
+            raise InputError(
+                f"{file} states {as_text(found) if found else 'no wavelengths'}, and {source} {as_text(known)}: "
+                "all views have the same bands"
+            )
+    return known
 
 
 def info_of_file(decoded: Decoded) -> FolderInfo:

@@ -237,7 +237,7 @@ def _sparse(
     def made(places: Iterable[tuple[int, int]], shape: tuple[int, int], cameras: Cameras) -> SparseViews:
         frame = cameras.frame((*shape, *info.picture_shape))
         seen = info.disparity_range if orientation in ("auto", "as-is") else None
-        stated = grid.geometry.wavelengths
+        stated = info.wavelengths
         return SparseViews(pictures, tuple(places), shape, frame, seen, info.sample, stated)
 
     sparse = made(grid.present, grid.shape, cameras)
@@ -409,7 +409,7 @@ def _put_in_order(
     frame = info.frame if cameras is None else cameras.frame(values.shape)
     assert frame is not None  # a frame is stated if there are no cameras
     with checks.within(str(path)):
-        stated = opened.geometry.wavelengths
+        stated = info.wavelengths
         filling = None if opened.geometry.filling is None else opened.geometry.filling.moved(moved.steps)
         grid = Grid(
             values.shape,

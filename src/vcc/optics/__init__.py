@@ -3,7 +3,7 @@
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection, SlopeFunction
 from vcc.optics.diffractive_lens import DiffractiveLens
 from vcc.optics.diffuser import CodedDiffuser, Diffuser
-from vcc.optics.direction import AngleFilter, Louvre
+from vcc.optics.direction import AngleFilter, Louvre, RayFilter
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.first_order import FirstOrder, Pupil
 from vcc.optics.lens import Lens
@@ -42,6 +42,7 @@ __all__ = [
     "PrismArray",
     "Pupil",
     "Pyramid",
+    "RayFilter",
     "RayTable",
     "RayTableLens",
     "RealLens",

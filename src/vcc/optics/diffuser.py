@@ -13,7 +13,8 @@ from vcc.base.describe import Brief, instead_of_name
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.base.values import Value
-from vcc.optics.faces import Element, Faces
+from vcc.optics.dispersion import Dispersive
+from vcc.optics.faces import Faces
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.shapes.kernels import SUM_TOLERANCE, Gaussian, Kernel, Radial, Samples, TopHat
 from vcc.shapes.patterns import Bounded, Circle, Open, Pattern
@@ -31,7 +32,7 @@ def _refuse_names(kernel: object, label: str) -> None:
 
 
 @dataclass(frozen=True, repr=False)
-class Diffuser(Brief, Element):
+class Diffuser(Brief, Dispersive):
     """A diffuser that scatters light in the same way at every place.
 
     L'(u, v, s, t) = ∫∫ D(δs, δt) L(u, v, s − δs, t − δt) dδs dδt: a ray keeps its place and leaves with its
@@ -45,6 +46,9 @@ class Diffuser(Brief, Element):
         diameter: of a round diffuser, metres; opaque outside.
         width: of a rectangular diffuser, metres; opaque outside. Without diameter and width there is no rim.
         height: of a rectangular diffuser, metres; None makes it square.
+        glass: None, or what a surface relief is made of: slopes ∝ n(λ) − 1; see
+            `vcc.optics.dispersion.Dispersive`.
+        design_wavelength: at which the kernel holds.
 
     Raises:
         InputError: an array that `vcc.kernels.Samples` does not accept (negative, not finite, a sum other than
@@ -100,9 +104,13 @@ class Diffuser(Brief, Element):
             rim = Bounded(Open(), self.width, self.width if self.height is None else self.height)
         return Faces(transmission=rim, scatter=self.kernel)
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        assert isinstance(self.kernel, Kernel)
+        return {"kernel": self.kernel.stretched(factor)}
+
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CodedDiffuser(Brief, Value, Element):
+class CodedDiffuser(Brief, Value, Dispersive):
     """A diffuser whose kernel varies over its surface: D(δs, δt | u, v) (paper, eq. 6).
 
     D(δ | u, v) = Σₙ weightₙ(u, v) · Dₙ(δ / w(u, v)) / w(u, v)²: kernels mixed by weights, stretched by w.
@@ -117,6 +125,8 @@ class CodedDiffuser(Brief, Value, Element):
             passes unscattered.
         height: of the sheet, metres; None keeps cells square.
         normalise: divide the weights by their sum at each place.
+        glass: as of `Diffuser`.
+        design_wavelength: as of `Diffuser`.
 
     Maps hold values at the middles of the cells and are interpolated bilinearly between them.
 
@@ -211,6 +221,10 @@ class CodedDiffuser(Brief, Value, Element):
             scatter=Scatter(self.kernels, weights=weights, width=stretch, largest_width=largest),
         )
 
+    def _stronger(self, factor: float) -> dict[str, Any]:
+        assert isinstance(self.kernels, tuple)
+        return {"kernels": tuple(kernel.stretched(factor) for kernel in self.kernels)}
+
     def described(self) -> str:
         """The kernels, the cells of the maps and the sheet's size as text."""
         assert isinstance(self.kernels, tuple)
@@ -220,4 +234,6 @@ class CodedDiffuser(Brief, Value, Element):
             if values is not None:
                 rows, columns = values.shape[-2:]
                 parts.append(f"{verb} over {rows}×{columns} cells")
+        if self.glass is not None:
+            parts.append(f"glass {self.glass if isinstance(self.glass, str) else self.glass.described()}")
         return "; ".join([*parts, f"width {short(self.width)}, height {short(self.height)}"])

@@ -1,10 +1,11 @@
-"""Elements whose transmission depends on the direction of light: angle filters and louvres."""
+"""Elements whose transmission depends on the direction of light: angle filters, louvres, functions of rays."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.optics.faces import Element, Faces
-from vcc.optics.terms import Term
+from vcc.optics.terms import RayTransmission, Term
 from vcc.shapes.directional import Gaps
-from vcc.shapes.patterns import Pattern, as_pattern
+from vcc.shapes.patterns import Pattern, accepts, as_pattern
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,42 @@ class AngleFilter(Element):
     def faces(self) -> Faces:
         """A transmission by slopes."""
         return Faces(terms=(Term.of_slopes(self.pattern),))
+
+
+@dataclass(frozen=True)
+class RayFilter(Element):
+    """A filter that transmits by place and direction at once: any function T(x, y, s, t).
+
+    Images are made by rays. They evaluate T as a sum of up to 64 products of a function of place and one of slope,
+    which are slices of T (cross approximation, Bebendorf 2000). `Camera.explain` reports the error, and a capture
+    warns of more than 1 %.
+
+    Args:
+        function: T(x, y, s, t) of arrays of one shape: places in metres from the element's middle, and slopes of
+            the arriving rays. Returns the share of light that passes, 0 to 1. It is not stored in camera files.
+
+    Raises:
+        InputError: what is no function of four numbers.
+    """
+
+    function: Callable[[Array, Array, Array, Array], ArrayLike]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        given: Any = self.function
+        if not callable(given) or isinstance(given, type) or not accepts(given, 4):
+            raise InputError(
+                f"the function of {self.label} is a function T(x, y, s, t) of places in metres and slopes, not "
+                f"{self.function!r}: a function of (x, y) is a vcc.Mask, one of (s, t) a vcc.AngleFilter"
+            )
+
+    def described(self) -> str:
+        """The function's name."""
+        return f"transmission {getattr(self.function, '__name__', repr(self.function))}(x, y, s, t)"
+
+    def faces(self) -> Faces:
+        """A transmission by place and slope."""
+        return Faces(by_ray=RayTransmission(self.function))
 
 
 @dataclass(frozen=True)

@@ -25,9 +25,9 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.band import Band
 from vcc.optics.deflections import Deflection, as_deflection
 from vcc.optics.scatter import Scatter
-from vcc.optics.terms import Term
+from vcc.optics.terms import RayTransmission, Term
 from vcc.shapes.kernels import Kernel
-from vcc.shapes.patterns import Pattern, as_pattern
+from vcc.shapes.patterns import Pattern, accepts, as_pattern
 
 LONGEST_NAME = 200
 """Maximum number of characters of an element's name, which notes and messages repeat."""
@@ -44,10 +44,12 @@ class Faces:
             a `Deflection` (arrays, plates), or a function of (x, y) in metres that returns (Δs, Δt); None deflects
             nothing. A `Deflection` whose parameters make it affine, or zero (`Deflection.affine`), is simplified.
         transmission: the share of light that passes, by position: a `vcc.patterns.Pattern` or a function of
-            (x, y) in metres; None transmits all light.
+            (x, y) in metres; None transmits all light. A function of (x, y, s, t), of the arriving ray, becomes
+            ``by_ray``.
         scatter: distribution of light over slopes: a `Kernel`, or a `Scatter` whose kernel varies with the
             position; None scatters nothing.
         terms: further factors of the transmission, which also depend on the direction of the arriving ray.
+        by_ray: a further factor, any function of the arriving ray (x, y, s, t); images are then made by rays.
 
     Raises:
         InputError: an affine deflection that moves positions or mixes slopes (then the element is not thin),
@@ -55,11 +57,21 @@ class Faces:
     """
 
     deflection: Affine | Deflection | Aberrations | Callable[[Array, Array], Any] | None = None
-    transmission: Pattern | Callable[[Array, Array], ArrayLike] | None = None
+    transmission: Pattern | Callable[..., ArrayLike] | None = None
     scatter: Scatter | Kernel | None = None
     terms: tuple[Term, ...] = ()
+    by_ray: RayTransmission | None = None
 
     def __post_init__(self) -> None:
+        given: Any = self.transmission
+        if (
+            callable(given)
+            and not isinstance(given, Pattern | type)
+            and not accepts(given, 2)
+            and accepts(given, 4)
+        ):
+            object.__setattr__(self, "by_ray", RayTransmission(given))
+            object.__setattr__(self, "transmission", None)
         terms = (self.terms,) if isinstance(self.terms, Term) else tuple(self.terms)
         for term in terms:
             if not isinstance(term, Term):
@@ -81,6 +93,11 @@ class Faces:
     def pattern(self) -> Pattern | None:
         """The transmission as a pattern."""
         return None if self.transmission is None else as_pattern(self.transmission)
+
+    @property
+    def directed(self) -> Faces:
+        """What acts on the arriving ray alone, before anything of the element's plane bends it."""
+        return Faces(terms=self.terms, by_ray=self.by_ray)
 
     @property
     def affine(self) -> Affine | None:

@@ -153,7 +153,7 @@ def to_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Arra
     for stage in light_stages(train):
         rays = stage.approach(rays)
         if rims:
-            light = light * _transmission(stage, rays)
+            light = light * stage.share(rays)
         rays, passed = _crossed(stage, rays, rims)
         light = light * passed
     return np.asarray(train.approach_to_sensor(rays)), light
@@ -167,15 +167,6 @@ def _crossed(stage: Stage, rays: Array, rims: bool) -> tuple[Array, Array]:
         free = replace(stage, faces=replace(stage.faces, deflection=bending.without_rims))
         return free.deflected(rays), np.ones(rays.shape[:-1])
     return (rays if bending is not None else stage.deflected(rays)), np.ones(rays.shape[:-1])
-
-
-def _transmission(stage: Stage, rays: Array) -> Array:
-    """The share of light that a stage's pattern transmits."""
-    if stage.faces.pattern is None:
-        return np.ones(rays.shape[:-1])
-    x, y = np.moveaxis(rays[..., :2] - stage.element.decentre, -1, 0)
-    with stage.named():
-        return np.broadcast_to(np.asarray(stage.faces.pattern(x, y), dtype=np.float64), x.shape)
 
 
 def from_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Array]:
@@ -206,7 +197,7 @@ def from_sensor(train: Train, rays: Array, rims: bool = True) -> tuple[Array, Ar
         elif bending is not None:
             s, t = stage.bent(rays[..., 0], rays[..., 1])
             rays = rays - np.stack([0 * s, 0 * s, s, t], axis=-1)
-        share = share * _transmission(stage, rays) if rims else share
+        share = share * stage.share(rays) if rims else share
     return np.asarray(onward.inverse()(rays)), share
 
 

@@ -19,7 +19,7 @@ from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.errors import InputError
 from vcc.base.values import Value
-from vcc.shapes.patterns import Pattern, as_pattern
+from vcc.shapes.patterns import Pattern, as_pattern, as_transmission
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,31 @@ PLACE = ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 """The numbers of a position mask: (x, y)."""
 SLOPE = ((0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 """The numbers of an angle filter: (s, t), as metres on a sheet one metre away."""
+
+
+@dataclass(frozen=True, eq=False)
+class RayTransmission(Value):
+    """A transmission by place and direction at once: any function of four numbers.
+
+    Args:
+        function: T(x, y, s, t), of places in metres from the element's middle and slopes of the arriving ray,
+            arrays of one shape; returns the share of light that passes, 0 to 1.
+        owner: the element, named in errors of the function.
+    """
+
+    function: Callable[[Array, Array, Array, Array], ArrayLike]
+    owner: str = ""
+
+    def share(self, rays: Array) -> Array:
+        """The share of light that passes, of rays (..., 4) about the element's middle.
+
+        Raises:
+            InputError: the function returns another shape, or numbers outside 0 to 1.
+        """
+        x, y, s, t = np.moveaxis(rays, -1, 0)
+        name = f"transmission {getattr(self.function, '__name__', repr(self.function))}"
+        name = f"{self.owner}: {name}" if self.owner else name
+        return as_transmission(name, self.function(x, y, s, t), x.shape)
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,6 +63,9 @@ class Stage(Brief):
         if self.faces.pattern is not None:
             named = owned(self.faces.pattern, self.element.label)
             object.__setattr__(self, "faces", replace(self.faces, transmission=named))
+        if self.faces.by_ray is not None:
+            by_ray = replace(self.faces.by_ray, owner=self.element.label)
+            object.__setattr__(self, "faces", replace(self.faces, by_ray=by_ray))
 
     @property
     @cached
@@ -104,6 +107,17 @@ class Stage(Brief):
         slopes = self.bent(rays[..., 0], rays[..., 1])
         still = np.zeros_like(slopes[0])
         return np.asarray(rays + np.stack([still, still, *slopes], axis=-1))
+
+    def share(self, rays: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The share of light (...) that the transmission passes, of rays (..., 4) of the camera just before it."""
+        rays = rays - [*self.element.decentre, 0.0, 0.0]
+        share = np.ones(rays.shape[:-1])
+        with self.named():
+            if self.faces.pattern is not None:
+                share = share * self.faces.pattern(rays[..., 0], rays[..., 1])
+        for term in self.faces.terms:
+            share = share * term.share(rays)
+        return share if self.faces.by_ray is None else share * self.faces.by_ray.share(rays)
 
     def crossed(self, rays: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Rays (..., 4) behind the deflection, and their light (...), as in `Aberrations.crossed`."""
@@ -160,12 +174,17 @@ def met_in_order(elements: Sequence[Element]) -> Iterator[tuple[Element, tuple[P
         if len(plane) == 1:
             yield plane[0]
             continue
-        directed = [(element, part.terms) for element, (part,) in plane if isinstance(part, Faces) and part.terms]
-        yield from ((element, (Faces(terms=terms),)) for element, terms in directed)
+        directed = [(element, part.directed) for element, (part,) in plane if isinstance(part, Faces)]
+        yield from ((element, (faces,)) for element, faces in directed if faces != NOTHING)
         for element, (part,) in plane:
-            rest = replace(part, terms=()) if isinstance(part, Faces) and part.terms else part
+            rest = _undirected(part) if isinstance(part, Faces) else part
             if rest is part or rest != NOTHING:
                 yield element, (rest,)
+
+
+def _undirected(faces: Faces) -> Faces:
+    """The faces without those that act on the arriving ray; the same object if there are none."""
+    return faces if faces.directed == NOTHING else replace(faces, terms=(), by_ray=None)
 
 
 def _in_one_plane(one: tuple[Element, tuple[Part, ...]], other: tuple[Element, tuple[Part, ...]]) -> bool:
@@ -315,10 +334,14 @@ class Train(Value, Shown):
                     faces = Faces(transmission=term.pattern)
                     stages.append(Stage(element, here, approach, faces, approach @ leaving, term))
                     approach, leaving = to_plane.inverse(), stages[-1].leaving
-                if part.terms:
-                    part = replace(part, terms=())
-                    if part == NOTHING:
-                        continue
+                if part.by_ray is not None:
+                    faces = Faces(by_ray=part.by_ray)
+                    stages.append(Stage(element, here, approach, faces, approach @ leaving))
+                    approach, leaving = Affine.identity(), stages[-1].leaving
+                rest = _undirected(part)
+                if rest is not part and rest == NOTHING:
+                    continue
+                part = rest
                 stages.append(Stage(element, here, approach, part, approach @ leaving))
                 approach, leaving = Affine.identity(), stages[-1].leaving
             here += element.length

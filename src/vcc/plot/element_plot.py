@@ -104,10 +104,11 @@ def _beam(element: Element, half: float, axis: int) -> float:
 
 def _slopes(element: Element, axis: int) -> tuple[float, ...]:
     """Slopes of the drawn light: 0, and two more for an element that filters directions."""
-    terms = [term for part in element.parts() if isinstance(part, Faces) for term in part.terms]
-    if not terms:
+    faces = [part for part in element.parts() if isinstance(part, Faces)]
+    terms = [term for part in faces for term in part.terms]
+    if not terms and all(part.by_ray is None for part in faces):
         return (0.0,)
-    steepest = min(term.steepest[axis] for term in terms)
+    steepest = min((term.steepest[axis] for term in terms), default=math.inf)
     most = steepest if math.isfinite(steepest) else UNBOUNDED_SLOPE
     return (0.0, 0.55 * most, -1.1 * most)
 

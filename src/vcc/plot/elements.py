@@ -271,7 +271,7 @@ def _draw_by_faces(pen: Pen, element: Element, faces: Faces) -> None:
         _draw_frosted(pen, element, faces.spread, half)
     if faces.pattern is None:
         if not (bends or scatters):
-            _draw_sheet(pen, element, by_direction=bool(faces.terms))
+            _draw_sheet(pen, element, by_direction=bool(faces.terms) or faces.by_ray is not None)
         return
     if not (bends or scatters):
         _draw_mask(pen, element, faces.pattern)

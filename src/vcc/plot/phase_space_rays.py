@@ -226,13 +226,8 @@ class _Bundle:
 
     def meet(self, stage: Stage, count: int) -> None:
         """Absorb, bend and scatter the rays at a stage."""
-        x, y = (self.rays[:, :2] - stage.element.decentre).T
-        if stage.faces.pattern is not None:
-            share = stage.faces.pattern(x, y)
-            self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
-        for term in stage.faces.terms:
-            share = term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
-            self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
+        share = stage.share(self.rays)
+        self.radiance = self.radiance * (share if self.radiance.ndim == 1 else share[:, None])
         if isinstance(stage.faces.bending, Aberrations):
             self._refract(stage)
         else:

@@ -181,10 +181,7 @@ class _Bundle:
     def meet(self, stage: Stage, split_along: int | None) -> None:
         """Absorb, bend and scatter the rays."""
         x, y = (self.rays[:, :2] - stage.element.decentre).T
-        if stage.faces.pattern is not None:
-            self.share = self.share * stage.faces.pattern(x, y)
-        for term in stage.faces.terms:
-            self.share = self.share * term.share(self.rays - [*stage.element.decentre, 0.0, 0.0])
+        self.share = self.share * stage.share(self.rays)
         bent = stage.deflected(self.rays)
         going = np.asarray(np.isfinite(bent).all(axis=1))  # others are outside the opening of a table of rays
         self.rays, self.share = np.where(going[:, None], bent, self.rays), np.where(going, self.share, 0.0)

@@ -123,7 +123,7 @@ class HeterodyneSetup:
         """
         mask, pattern = _carrier_mask(camera)
         for stage in camera.stages:
-            if stage.term is not None:
+            if stage.term is not None or stage.faces.by_ray is not None:
                 raise InputError(
                     f"heterodyne decoding needs transmission by position, and {stage.element.label} transmits by "
                     "direction"

@@ -29,6 +29,7 @@ from vcc.optics.bands import refuse
 from vcc.optics.faces import Element
 from vcc.optics.mask import Mask
 from vcc.optics.scatter import Scatter
+from vcc.optics.terms import RayTransmission
 from vcc.optics.train import Stage, Train
 from vcc.plan.footprints.aperture import Aperture
 from vcc.plan.footprints.mask_textures import MaskMet
@@ -44,7 +45,7 @@ SPLINE_ORDER = {"nearest": 0, "linear": 1, "cubic": 3}
 
 def masked_at(
     light_field: Field,
-    planes: list[tuple[Pattern, tuple[float, float], Affine]],
+    planes: list[tuple[Pattern | RayTransmission, tuple[float, float], Affine]],
     memory_limit: int | None = None,
 ) -> Field:
     """The light field times the transmission of patterns at several planes; its plane and frame stay the same.
@@ -52,7 +53,8 @@ def masked_at(
     Args:
         light_field: at some plane.
         planes: for each pattern: the pattern, the position (x, y) of its centre in metres, and the map of rays
-            from the light field's plane to the pattern's.
+            from the light field's plane to the pattern's. A function of rays is evaluated in the middle of each
+            sample.
         memory_limit: bytes; None takes `vcc.base.memory.MEMORY_LIMIT`.
 
     Raises:
@@ -93,10 +95,13 @@ def carried_to(
                 f"{stage.element.label} is not affine: behind it the light field has no frame. Choose a z "
                 "before it, or compute the image (camera.capture)"
             )
-    planes: list[tuple[Pattern, tuple[float, float], Affine]] = []
+    planes: list[tuple[Pattern | RayTransmission, tuple[float, float], Affine]] = []
     for stage in passed:
-        if stage.faces.pattern is not None:
-            planes.append((stage.faces.pattern, stage.element.decentre, stage.arriving))
+        planes += [
+            (each, stage.element.decentre, stage.arriving)
+            for each in (stage.faces.pattern, stage.faces.by_ray)
+            if each is not None
+        ]
         if stage.faces.spread is not None:
             # To the diffuser, and back to the plane to which the maps of the next masks refer.
             arriving = transformed(masked_at(light_field, planes, memory_limit), stage.arriving)
@@ -117,10 +122,19 @@ def transformed(light_field: Field, rays: Affine) -> Field:
 
 
 def _weights(
-    light_field: Field, pattern: Pattern, decentre: tuple[float, float], rays: Affine
+    light_field: Field, pattern: Pattern | RayTransmission, decentre: tuple[float, float], rays: Affine
 ) -> Callable[[int, int], Any]:
     """Transmission of a pattern for view (j, i): a number if it depends on the view only, else (rows, columns)."""
     nv, nu, nt, ns = light_field.shape[:4]
+    if isinstance(pattern, RayTransmission):
+        arriving = Affine.translation(-decentre[0], -decentre[1], 0, 0) @ rays @ light_field.frame
+        column, row = np.meshgrid(np.arange(float(ns)), np.arange(float(nt)))
+
+        def of_view(j: int, i: int) -> NDArray[np.float64]:
+            index = np.stack([np.full_like(row, i), np.full_like(row, j), column, row], axis=-1)
+            return pattern.share(arriving(index))
+
+        return of_view
     plane = Plane.met_by(light_field.frame, rays, pattern, decentre, "pattern")
     views, still = Taps.of((nv, nu), CellDivision(1, False)), np.zeros((2, 2))
     if depends_on_view_only(plane, (nt, ns), still):
@@ -147,6 +161,11 @@ def masked(light_field: Field, mask: Mask, memory_limit: int | None = None) -> F
 
 def scattered(light_field: Field, diffuser: Element, memory_limit: int | None = None) -> Field:
     """The paper's convolution L ⊗ D; see `vcc.LightField.scattered`."""
+    if diffuser.depends_on_band:
+        raise InputError(
+            f"{diffuser.label} scatters each wavelength otherwise, and light_field.scattered treats all channels "
+            "alike: scatter channel by channel with diffusers without a glass, or put it in a vcc.Camera"
+        )
     faces = diffuser.faces()
     if faces.spread is None:
         raise InputError(f"{diffuser.label} does not scatter light: its faces have no kernel")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import abc
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,16 @@ class Kernel(Shown, abc.ABC):
     @abc.abstractmethod
     def density(self, s: ArrayLike, t: ArrayLike) -> Array:
         """D at changes of slope (s, t), per unit of slope squared; it integrates to 1."""
+
+    def stretched(self, factor: float) -> Kernel:
+        """The kernel with all changes of slope times a factor above 0, as glass has at another wavelength.
+
+        Raises:
+            InputError: a kernel of your own without this method.
+        """
+        raise InputError(
+            f"{type(self).__name__} cannot be stretched, as glass needs: give it a method stretched(factor)"
+        )
 
     def quadrature(self, points: int = 256) -> tuple[Array, Array]:
         """Changes of slope (n, 2) and their shares (n,), which sum to 1: the kernel as a sum of n rays.
@@ -151,6 +161,12 @@ class Gaussian(Kernel):
                 "that is spread along one axis only, give the other a sigma far below a pixel, such as 1e-9"
             )
 
+    def stretched(self, factor: float) -> Gaussian:
+        """With other standard deviations."""
+        if isinstance(self.sigma, tuple):
+            return Gaussian((self.sigmas[0] * factor, self.sigmas[1] * factor))
+        return Gaussian(self.sigma * factor)
+
     @property
     def sigmas(self) -> tuple[float, ...]:
         """The standard deviations along (s, t) before the cut."""
@@ -222,6 +238,10 @@ class TopHat(Kernel):
     def __post_init__(self) -> None:
         checks.above_zero("width of a top hat", self.width, "a slope")
         checks.one_of("shape of a top hat", self.shape, ("disc", "square"))
+
+    def stretched(self, factor: float) -> TopHat:
+        """With another width."""
+        return replace(self, width=self.width * factor)
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -304,6 +324,11 @@ class Radial(Brief, Kernel):
         object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "radii", tuple(radii.tolist()))
         object.__setattr__(self, "profile", tuple(profile.tolist()))
+
+    def stretched(self, factor: float) -> Radial:
+        """With other radii, and densities per slope²."""
+        radii, profile = np.array(self.radii) * factor, np.array(self.profile) / factor**2
+        return Radial(tuple(radii.tolist()), tuple(profile.tolist()))
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -396,6 +421,10 @@ class Samples(Value, Kernel):
         values.flags.writeable = False
         object.__setattr__(self, "normalise", False)
         object.__setattr__(self, "values", values)
+
+    def stretched(self, factor: float) -> Samples:
+        """With another pitch."""
+        return replace(self, slope_pitch=self.slope_pitch * factor)
 
     @property
     def reach(self) -> tuple[float, float]:

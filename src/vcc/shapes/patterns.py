@@ -550,18 +550,26 @@ class FunctionPattern(Pattern):
         shape = x.shape
         name = f"pattern {getattr(self.function, '__name__', repr(self.function))}"
         name = f"{self.owner}: {name}" if self.owner else name
-        returned = self.function(x, y)
-        checks.plain(f"what {name} returned", returned)
-        values = np.asarray(returned, dtype=np.float64)
-        if values.shape not in (shape, ()):
-            raise InputError(f"{name} returned shape {values.shape} for positions of shape {shape}")
-        if not np.isfinite(values).all():
-            raise InputError(f"{name} returned numbers that are not finite")
-        if values.min() < 0 or values.max() > 1:
-            raise InputError(
-                f"{name} returned transmission from {values.min():g} to {values.max():g}; it lies between 0 and 1"
-            )
-        return np.broadcast_to(values, shape)
+        return as_transmission(name, self.function(x, y), shape)
+
+
+def as_transmission(name: str, returned: Any, shape: tuple[int, ...]) -> Array:
+    """What a function of the user returned, as an array of the given shape.
+
+    Raises:
+        InputError: another shape, or numbers that are not finite or lie outside 0 to 1.
+    """
+    checks.plain(f"what {name} returned", returned)
+    values = np.asarray(returned, dtype=np.float64)
+    if values.shape not in (shape, ()):
+        raise InputError(f"{name} returned shape {values.shape} for positions of shape {shape}")
+    if not np.isfinite(values).all():
+        raise InputError(f"{name} returned numbers that are not finite")
+    if values.size and (values.min() < 0 or values.max() > 1):
+        raise InputError(
+            f"{name} returned transmission from {values.min():g} to {values.max():g}; it lies between 0 and 1"
+        )
+    return np.broadcast_to(values, shape)
 
 
 def owned(pattern: Pattern, owner: str) -> Pattern:
@@ -599,20 +607,25 @@ def as_pattern(pattern: Pattern | Callable[[Array, Array], ArrayLike]) -> Patter
     )
 
 
+def accepts(function: Callable[..., Any], arguments: int) -> bool:
+    """Whether a function can be called with so many numbers; functions written in C may hide their signature."""
+    try:
+        inspect.signature(function).bind(*[0.0] * arguments)
+    except TypeError:
+        return False
+    except ValueError:
+        return True
+    return True
+
+
 def _check_two_arguments(function: Callable[..., Any]) -> None:
     """Raise if a function cannot be called with (x, y), such as one of position and slope."""
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):  # written in C, without a signature
-        return
-    try:
-        signature.bind(0.0, 0.0)
-    except TypeError:
+    if not accepts(function, 2):
         raise InputError(
-            f"a pattern is a function of two numbers, (x, y), and this one has the arguments {signature}. A "
-            "transmission that depends on direction, too, is a product of vcc.Term objects, each a function of "
-            "two numbers that are affine in (x, y, s, t): vcc.Faces(terms=(vcc.Term.of_slopes(function),))"
-        ) from None
+            "a pattern is a function of two numbers, (x, y), and this one has the arguments "
+            f"{inspect.signature(function)}. A transmission T(x, y, s, t) that depends on direction, too, is "
+            "vcc.RayFilter(function), or vcc.Faces(transmission=function) of your own element"
+        )
 
 
 @dataclass(frozen=True)

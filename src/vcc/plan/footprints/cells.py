@@ -18,6 +18,7 @@ from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
+from vcc.shapes.patterns import Circle
 from vcc.shapes.stacked_patterns import clear_over, dark_over, has_edges
 
 Array = NDArray[np.float64]
@@ -32,8 +33,10 @@ SPILT = 0.25
 """Share of the light cut off by a mask inside a finer sample as wide as a pixel that falls on the wrong pixel."""
 SMOOTH = 43.0
 """Factor of the error of a sharp image behind a smooth mask. Behind a cosine that loses a share L of its mean
-squared to finer samples, the error is (6L)³/5; the power used is smaller, because the finest of several cosines
-counts most."""
+squared to finer samples, the error is (6L)³/5; the power used is 2.5, because the finest of several cosines
+counts most. Of a cosine that a penumbra makes a times as weak, a²L is lost, and the error is a times as large."""
+ROUND = math.sqrt(3) / 2
+"""Width of a box with the variance of a disc, in diameters: averages over both lose about the same detail."""
 SHEARED = 1.3
 """Width of the footprint (shifted rows) relative to the width of the sample above which samples are divided."""
 MISPLACED = 0.3
@@ -73,6 +76,7 @@ class Geometry(Brief):
         parts: parts of a sample along each axis that its shape on the sensor requires, see `parts_of_sheared`.
         beyond: (before, after) along rows and columns of samples: samples that the whole light field has beyond
             this piece. All pieces are divided as the whole is.
+        stops: planes of masks, of which those of limited size bound the light that a point of the sensor sees.
     """
 
     views: tuple[int, int]
@@ -84,6 +88,7 @@ class Geometry(Brief):
     margin: float
     parts: int = 1
     beyond: tuple[tuple[int, int], tuple[int, int]] = ((0, 0), (0, 0))
+    stops: tuple[Plane, ...] = ()
 
     def met(self, plane: Plane, view: Array, parts: int = 1) -> tuple[Array, Array]:
         """The lowest and the highest place (x, y) at which the samples of parts of views meet a plane.
@@ -110,12 +115,29 @@ class Geometry(Brief):
         return low, np.maximum(low, high)
 
     def penumbra(self, plane: Plane) -> Array:
-        """Size (x, y) of the region of a plane that one point of the sensor sees through all views, metres."""
+        """Size (x, y) of the part of a plane that one point of the sensor sees through the open views, metres."""
+        views = np.array(self.extent[::-1])
+        for stop in self.stops:
+            if stop is not plane:
+                size = np.array(stop.pattern.size) * (ROUND if isinstance(stop.pattern, Circle) else 1.0)
+                by_view = self._by_view(stop)
+                views = np.minimum(
+                    views,
+                    np.divide(size[:, None], by_view, out=np.full((2, 2), np.inf), where=by_view > 0).min(axis=0),
+                )
+        return np.asarray(self._by_view(plane) @ views)
+
+    def width_of_edges(self, plane: Plane) -> float:
+        """Width of the shadows of edges on the sensor, along the sharper axis, pixels; infinite without edges."""
         by_pixel = self._by_pixel(plane)
-        by_view = plane.at_index[:, :2]
-        if by_pixel is not None:
-            by_view = by_view - by_pixel @ self.on_sensor[:, :2]
-        return np.asarray(np.abs(by_view) @ np.array(self.extent[::-1]))
+        if by_pixel is None or not has_edges(plane.pattern) or not self.varying([plane]).any():
+            return math.inf
+        return float((self.penumbra(plane) / np.maximum(np.abs(by_pixel).sum(axis=1), 1e-300)).min())
+
+    def _by_view(self, plane: Plane) -> Array:
+        """2×2: metres on a plane, either way, per view through which one point of the sensor sees it."""
+        by_pixel, by_view = self._by_pixel(plane), plane.at_index[:, :2]
+        return np.abs(by_view if by_pixel is None else by_view - by_pixel @ self.on_sensor[:, :2])
 
     def _by_pixel(self, plane: Plane) -> Array | None:
         """2×2: metres on a plane per pixel of the sensor, within a view; None if a view is a point."""
@@ -261,7 +283,7 @@ class SampleDivision(NamedTuple):
     Args:
         parts: of each sample, along each axis.
         error: remaining, a share of the light.
-        hard: whether a mask has edges.
+        hard: whether a mask has edges whose shadows are narrower than a finer sample.
     """
 
     parts: int
@@ -284,7 +306,7 @@ def divide_samples(
 
     The light of a sample, weighted by the mask, lands on the pixels as one footprint. Mask detail that survives
     the aperture's penumbra but would be blurred by the footprint needs finer samples. The sharpening filter
-    removes nearly all of the error if the detail is smooth; it cannot at hard edges.
+    removes nearly all of the error if the detail is smooth, as in soft shadows; it cannot at hard edges.
 
     Args:
         planes: masks in mid-path.
@@ -299,10 +321,16 @@ def divide_samples(
     def left(number: int, parts: int) -> SampleDivision:
         plane = planes[number]
         sample = np.abs(plane.sample_step).sum(axis=1) / parts
-        lost = max(detail.lost(plane, geometry.penumbra(plane), sample), 0.0)
-        if has_edges(plane.pattern):
-            return SampleDivision(parts, SPILT * math.sqrt(lost) * size / parts, True)
-        return SampleDivision(parts, SMOOTH * lost**2.5, False)
+        penumbra = geometry.penumbra(plane)
+        lost = max(detail.lost(plane, penumbra, sample), 0.0)
+        hard = has_edges(plane.pattern)
+        touching = hard and bool((penumbra < sample).any())
+        error = math.sqrt(lost) * (SPILT * size / parts if hard else 1.0)
+        if not touching and error > ERROR:  # the filter compensates the loss of smooth shadows
+            error *= min(SMOOTH * max(detail.lost(plane, np.zeros(2), sample), 0.0) ** 2, 1.0)
+        elif not hard:
+            error = 0.0
+        return SampleDivision(parts, error, touching)
 
     if refine == 1 or not planes:
         return SampleDivision(geometry.parts, 0.0, False)

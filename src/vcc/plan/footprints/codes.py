@@ -101,8 +101,11 @@ class Codes(Brief):
 
     @property
     def _folded(self) -> bool:
-        """Whether nothing scatters, and nothing bends rays by a function of position."""
-        return all(stage.faces.spread is None and stage.faces.bending is None for stage in self.base.stages)
+        """Whether nothing scatters, bends rays by a function of position, or transmits by place and slope."""
+        return all(
+            stage.faces.spread is None and stage.faces.bending is None and stage.faces.by_ray is None
+            for stage in self.base.stages
+        )
 
     def _at_views(self, grid: Grid, how: How) -> ByFootprints | None:
         """The common plan, with all cells open; None if the mask affects more than the weights of views."""

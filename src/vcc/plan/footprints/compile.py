@@ -47,7 +47,7 @@ from vcc.plan.footprints.mask_textures import MaskMet, TextureChoices, Textured,
 from vcc.plan.footprints.model import Footprints, MaskLookup
 from vcc.plan.footprints.planes import tap_origin
 from vcc.plan.footprints.taps import CellDivision, Taps
-from vcc.plan.footprints.words import cautions_of, coarse_textures, notes_of
+from vcc.plan.footprints.words import cautions_of, coarse_textures, edges_in_one_pixel, notes_of
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.parallax_rule import BetweenViews, choose_between_views
@@ -115,6 +115,8 @@ def blurs_or_why_not(
     for stage in train.stages:
         if stage.faces.bending is not None:
             return f"{stage.element.label} bends rays by a function of position that is not affine"
+        if stage.faces.by_ray is not None:
+            return f"{stage.element.label} transmits by a function of place and slope"
         if stage.term is not None and stage.term.mixes:
             return f"{stage.element.label} depends on place and slope along one axis at once"
     blurs = diffusers_as_blurs(train, grid, how.interpolation == "sharp", kernels)
@@ -282,6 +284,7 @@ class ByFootprints:
             margin=MARGIN + max(self.between.gap_filled),
             parts=parts_of_sheared(landing.step) if self.sharp and self.how.refine != 1 else 1,
             beyond=beyond[::-1] if landing.swapped else beyond,
+            stops=(*self.absorbing.at_views, *self.absorbing.in_path),
         )
 
     @property
@@ -491,7 +494,16 @@ class ByFootprints:
         ghosts = 0.0 if self.how.between_views == "none" else self.between.gap_left
         pixel = max(1.0, abs(self.core.row_step))
         cautions = cautions_of(self.choose_cells, self.choose_samples, ghosts, pixel)
-        return cautions + coarse_textures(self.core.masks)
+        return cautions + self._edges_in_one_pixel + coarse_textures(self.core.masks)
+
+    @property
+    def _edges_in_one_pixel(self) -> tuple[str, ...]:
+        """Warnings of light that jumps within a pixel in which a mask against the sensor varies."""
+        if not self.choose_within_pixels or self.within_pixels is None:
+            return ()
+        widths = {plane.label: self.geometry.width_of_edges(plane) for plane in self.absorbing.in_path}
+        against = [plane.label for plane in self.absorbing.against_sensor]
+        return edges_in_one_pixel(widths, against, against_sensor.error_of_edges(self.within_pixels))
 
     # --- for images with other masks
 

@@ -22,6 +22,10 @@ COARSE_TEXTURE = 5e-3
 """Error of a mask's texture between its points, as a share of its largest value, above which a plan warns."""
 
 
+WIDE_SHADOW = 2.0
+"""Width of a shadow's edge, pixels, from which on neighbouring pixels show how light varies within one."""
+
+
 def notes_of(
     train: Train,
     view_planes: list[Plane],
@@ -110,6 +114,25 @@ def cautions_of(division: CellDivision, samples: SampleDivision, ghosts: float, 
             f"its edges. Pass {_finer(fine)}finer samples"
         )
     return tuple(found)
+
+
+def edges_in_one_pixel(widths: dict[str, float], against: list[str], moment: float) -> tuple[str, ...]:
+    """Warning for edges of light within pixels in which masks against the sensor vary.
+
+    Args:
+        widths: of the shadows of the edges of each mask in mid-path, pixels; wider ones are smooth light.
+        against: labels of the masks against the sensor.
+        moment: `vcc.plan.footprints.against_sensor.error_of_edges`, for a shadow of no width.
+    """
+    sharp = {label: width for label, width in widths.items() if width < WIDE_SHADOW}
+    error = moment / max(1.0, min(sharp.values())) if sharp else 0.0
+    if error <= TOO_MUCH:
+        return ()
+    return (
+        f"edges of {', '.join(sharp)} are sharp on the sensor, and {', '.join(against)} varies within pixels: "
+        f"pixels in which both do are wrong by up to {error:.1%} of the light there. Pass method='rays', or "
+        "smaller pixels",
+    )
 
 
 def _finer(parts: int) -> str:

@@ -194,6 +194,16 @@ def _mask(step: steps.TextureShares, before: Bundle, behind: Bundle) -> tuple[Bu
     return replace(behind, x=behind.x + gx, y=behind.y + gy, share=share), _under("texture", own)
 
 
+def _by_ray(step: steps.SharesByRay, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
+    there, towards = step.by_place(before.x, before.y), step.by_slope(before.s, before.t)
+    total = np.maximum((there * towards).sum(axis=-1), 0.0)
+    carried = (behind.share * before.share * (total > 0))[..., None]
+    gx, gy, by_place = texture_back(step.by_place, before.x, before.y, carried * towards)
+    gs, gt, by_slope = texture_back(step.by_slope, before.s, before.t, carried * there)
+    moved = replace(behind, x=behind.x + gx, y=behind.y + gy, s=behind.s + gs, t=behind.t + gt)
+    return replace(moved, share=behind.share * total), _under("by_place", by_place) | _under("by_slope", by_slope)
+
+
 def _diffuser(step: steps.Unscatter, before: Bundle, behind: Bundle) -> tuple[Bundle, Numbers]:
     """Slopes lose width · (random deflection of the selected kernel)."""
     place = (step.column + 2 * step.kernel_of(before))[..., None]
@@ -244,6 +254,7 @@ _BACK: dict[type, Callable[[Any, Bundle, Bundle], tuple[Bundle, Numbers]]] = {
     steps.CellShares: _mask_of_cells,
     steps.Cosines: _cosines,
     steps.TextureShares: _mask,
+    steps.SharesByRay: _by_ray,
     steps.Unscatter: _diffuser,
     steps.Refract: _refract,
     steps.MapRays: _mapped,

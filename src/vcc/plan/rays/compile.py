@@ -22,6 +22,7 @@ from vcc.optics.faces import Element
 from vcc.optics.ray_map import RayMap
 from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
+from vcc.optics.terms import RayTransmission
 from vcc.optics.train import Stage, Train
 from vcc.optics.visible_pupil import VisiblePupil
 from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, gathered, give
@@ -31,12 +32,14 @@ from vcc.plan.operators import Before, DarkBorder, SharpenViews
 from vcc.plan.parallax_rule import index_motions, vergences
 from vcc.plan.rays import steps
 from vcc.plan.rays.aim import AimChoices, Aimed, aim_now, choose_aim, found
-from vcc.plan.rays.bounds.extent import footprint
+from vcc.plan.rays.bounds.deflections import extents_at_legs
+from vcc.plan.rays.bounds.extent import RayExtent, footprint
 from vcc.plan.rays.bounds.windows import Aim, Window
 from vcc.plan.rays.linear import by_cells, by_surface, by_widths
 from vcc.plan.rays.model import Rays
 from vcc.plan.rays.path import Leg, Path
 from vcc.plan.rays.points import table
+from vcc.plan.rays.ray_filters import Slices, missed, rays_within
 from vcc.plan.rays.textures import (
     COARSE_SIZES,
     EXACT,
@@ -44,6 +47,7 @@ from vcc.plan.rays.textures import (
     SIZES,
     WORTH_SAYING,
     Enough,
+    Function,
     Points,
     Sampled,
     at_points,
@@ -58,6 +62,8 @@ from vcc.shapes.stacked_patterns import Product
 Array = NDArray[np.float64]
 
 DEFAULT_SAMPLES = 64
+WORTH_WARNING = 1e-2
+"""Error of a transmission by place and slope above which a plan warns, root mean square over rays: 40 dB."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -228,7 +234,7 @@ class ByRays:
             grid_shape=grid.shape[:4],
             core=core,
             before=before,
-            cautions=tuple(_cautions(self.train)),
+            cautions=(*_cautions(self.train), *self.met.cautions),
             notes=tuple(notes),
         )
 
@@ -286,6 +292,7 @@ class Met:
         steps: in the order in which rays meet them.
         index_from_ray: from rays behind all steps to the light field's indices.
         notes: for the plan.
+        cautions: for the plan.
         linears: the parameters of the steps that are linear in parameters of elements.
         choices: of each element, from the sensor on; none if nothing follows a camera.
     """
@@ -293,6 +300,7 @@ class Met:
     steps: tuple[steps.Step, ...]
     index_from_ray: Affine
     notes: tuple[str, ...]
+    cautions: tuple[str, ...]
     linears: tuple[Linear, ...]
     choices: tuple[ElementChoices, ...]
 
@@ -314,6 +322,7 @@ class _Met:
         parts: cached parts of nearby plans.
         points: of the textures that were made, in order.
         notes: for the plan.
+        cautions: for the plan.
         linears: its parameters that are linear in parameters of the element.
     """
 
@@ -328,6 +337,7 @@ class _Met:
     parts: Parts
     points: list[Points] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    cautions: list[str] = field(default_factory=list)
     linears: list[Linear] = field(default_factory=list)
 
     @property
@@ -367,6 +377,8 @@ def steps_met(
     all_met: list[_Met] = []
     choices: list[ElementChoices] = []
     pending = Affine.identity()
+    by_ray = any(leg.stage.faces.by_ray is not None for leg in path.legs)
+    extents = extents_at_legs(path, taken.aim) if by_ray else []
     for leg, region in zip(path.legs, taken.regions, strict=True):
         parts.check()
         pending = leg.undone @ pending
@@ -382,6 +394,8 @@ def steps_met(
                 check_unchanged("whether rays are aimed at it", own.aimed_at, at)
             if faces.pattern is not None and not at:
                 here += _transmission(faces.pattern, met)
+            if faces.by_ray is not None:
+                here.append(_by_ray(faces.by_ray, extents[leg.number], met))
             if isinstance(faces.bending, Aberrations):
                 made += _surfaces(faces.bending, stage.element, pending)
                 middle = stage.element.decentre
@@ -399,6 +413,7 @@ def steps_met(
         tuple(made),
         path.index_from_entrance @ path.entrance_from_last @ pending,
         tuple(note for met in all_met for note in met.notes),
+        tuple(caution for met in all_met for caution in met.cautions),
         tuple(linear for met in all_met for linear in met.linears),
         tuple(choices),
     )
@@ -487,6 +502,58 @@ def _transmission(pattern: Pattern, met: _Met) -> list[steps.Step]:
         met.notes.append(note)
     values = texture.values.astype(_kind(met.follow), copy=False)
     return [steps.TextureShares(replace(texture, values=values), label)]
+
+
+def _by_ray(transmission: RayTransmission, extent: RayExtent, met: _Met) -> steps.SharesByRay:
+    """The step that weights rays by a function of place and slope."""
+    ends = (extent.middle - extent.half)[2:], (extent.middle + extent.half)[2:]
+    unbounded = np.full(2, -np.inf), np.full(2, np.inf)
+    by_place = Sampled(_unknown, met.stage.element.decentre, met.region, met.passes, None)
+    by_slope = Sampled(_unknown, (0.0, 0.0), ends, unbounded, None)
+    boxes = [each.from_middle() for each in (by_place, by_slope)]
+    if met.chosen is not None:
+        boxes = [points.box for points in met.chosen]
+    elif met.follow is not None:
+        boxes = [each.with_room().from_middle() for each in (by_place, by_slope)]
+    slices = met.parts.part(
+        "slices of a transmission",
+        lambda: (content(transmission), content(boxes)),
+        lambda: Slices.of(transmission, boxes[0], boxes[1]),
+    )
+    coarse = len(met.sizes[1]) == 1
+
+    def texture(sampled: Sampled, values: Function, n: int) -> steps.Texture:
+        sampled = replace(sampled, values=values, of=(transmission, boxes, n))
+        made, _ = met.texture(sampled, slices.sizes[:1] if coarse else slices.sizes, EXACT)
+        return replace(made, values=made.values.astype(_kind(met.follow), copy=False))
+
+    there, towards = texture(by_place, slices.by_place, 0), texture(by_slope, slices.by_slope, 1)
+    step = steps.SharesByRay(there, towards, met.label)
+    rays = rays_within(extent, by_place.middle, by_place.from_middle())
+    if len(rays):
+        _state_error(missed(step, transmission, rays, by_place.middle), len(rays), step, met)
+    return step
+
+
+def _unknown(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
+    """Values that are replaced once they are known."""
+    raise NotImplementedError
+
+
+def _state_error(error: float, rays: int, step: steps.SharesByRay, met: _Met) -> None:
+    """Report by how much a step misses a transmission."""
+    terms = step.by_place.values.shape[2]
+    products = f"{terms} product{'s' if terms > 1 else ''} of a function of place and one of slope"
+    met.notes.append(
+        f"{met.label} is a sum of {products}; on {rays} other rays it misses the transmission by {error:.1g} of "
+        "its largest value, root mean square"
+    )
+    if error > WORTH_WARNING:
+        met.cautions.append(
+            f"the transmission of {met.label} is approximated by {products}, which miss it by {error:.1%} of its "
+            "largest value for single rays (root mean square). Pixels average over many rays, and miss less. "
+            "Soften its edges; a pattern of two numbers that are affine in the ray is exact as a vcc.Term"
+        )
 
 
 def _surfaces(lens: Aberrations, element: Element, pending: Affine) -> list[steps.Step]:

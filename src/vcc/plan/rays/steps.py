@@ -414,6 +414,36 @@ class TextureShares:
 
 
 @dataclass(frozen=True, eq=False)
+class SharesByRay:
+    """A transmission by place and slope: Σ aₖ(x, y)·bₖ(s, t), 0 where the sum is negative.
+
+    Args:
+        by_place: aₖ, (rows, columns, terms).
+        by_slope: bₖ, likewise, with slopes in place of metres.
+        words: text for notes.
+    """
+
+    by_place: Texture
+    by_slope: Texture
+    words: str
+    code: ClassVar[int] = 16
+
+    def __call__(self, rays: Bundle) -> None:
+        """Weight rays by the sum."""
+        products = self.by_place(rays.x, rays.y) * self.by_slope(rays.s, rays.t)
+        rays.share = rays.share * np.maximum(products.sum(axis=-1), 0.0)
+
+    def packed(self, packer: Packer) -> None:
+        """Both textures, and the number of terms."""
+        whole: list[int] = []
+        for texture in (self.by_place, self.by_slope):
+            table = packer.shares(np.asarray(texture.values, dtype=np.float32))
+            whole += [*texture.whole, table]
+        terms = int(self.by_place.values.shape[2])
+        packer.step(self.code, [*whole, terms], [*self.by_place.real, *self.by_slope.real])
+
+
+@dataclass(frozen=True, eq=False)
 class Unscatter:
     """A diffuser: each ray arrived with one of the deflections that its kernel allows, sampled evenly.
 

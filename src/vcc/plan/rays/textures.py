@@ -20,6 +20,8 @@ from vcc.plan.rays.steps import Texture
 from vcc.shapes.patterns import Pattern
 
 Array = NDArray[np.float64]
+Function = Callable[[Array, Array, tuple[float, float]], Array]
+"""Values at points of a texture, of (x, y, spacing)."""
 
 SIZES = (513, 1025, 2049)
 """Points a side of textures, tried until they are fine enough."""
@@ -55,7 +57,7 @@ class Sampled(Brief):
         itself: the function of (x, y) that the texture approximates, if different from ``values``.
     """
 
-    values: Callable[[Array, Array, tuple[float, float]], Array]
+    values: Function
     middle: tuple[float, float]
     region: tuple[Array, Array]
     passes: tuple[Array, Array]
@@ -111,6 +113,12 @@ class Points(Brief):
     start: tuple[float, float]
     spacing: tuple[float, float]
     error: float
+
+    @property
+    def box(self) -> tuple[Array, Array]:
+        """Lowest and highest (x, y) of the points."""
+        low = np.array(self.start)
+        return low, low + np.array(self.spacing) * (self.size - 1)
 
     def holds(self, low: Array, high: Array) -> bool:
         """Whether a region lies within the points, or at most one spacing outside, with constant values."""

@@ -6,7 +6,7 @@ grows with all such elements between it and the sensor.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,23 +65,29 @@ def regions_and_deflections(
         bends: largest change of slopes by each leg's stage; None, for all or for one: its largest deflection in
             the region where rays meet it.
     """
+    extents = list(_extents(path, aim, bends))
+    regions = [_met(extent, leg) for (extent, _), leg in zip(extents, path.legs, strict=False)]
+    return regions, DeflectionBounds([whole.loose for whole, _ in extents], [known.loose for _, known in extents])
+
+
+def extents_at_legs(path: Path, aim: Aim) -> list[RayExtent]:
+    """All aimed rays just behind each leg's stage, with a lens or prism there undone."""
+    return [extent for extent, _ in _extents(path, aim, None)][:-1]
+
+
+def _extents(path: Path, aim: Aim, bends: Sequence[Slopes] | None) -> Iterator[tuple[RayExtent, RayExtent]]:
+    """Extents at each leg and the entrance: with all deviations, and with those that the aim cannot compensate."""
     extent = extent_towards(path, aim)
     unknown = replace(extent, loose=np.zeros((4, 0)))
-    regions: list[tuple[Array, Array]] = []
-    deflections = DeflectionBounds([], [])
     for leg in path.legs:
         extent, unknown = extent.moved(leg.undone), unknown.moved(leg.undone)
-        deflections.whole.append(extent.loose)
-        deflections.unknown.append(unknown.loose)
-        regions.append(_met(extent, leg))
+        yield extent, unknown
         kept = None if bends is None else bends[leg.number]
-        most = _deviation(leg, extent, regions[-1]) if kept is None else kept
+        most = _deviation(leg, extent, _met(extent, leg)) if kept is None else kept
         if most is not None:
             extent, unknown = extent.loosened(most), unknown.loosened(most)
         extent, unknown = _scattered(extent, unknown, leg)
-    deflections.whole.append(extent.moved(path.entrance_from_last).loose)
-    deflections.unknown.append(unknown.moved(path.entrance_from_last).loose)
-    return regions, deflections
+    yield extent.moved(path.entrance_from_last), unknown.moved(path.entrance_from_last)
 
 
 def _met(extent: RayExtent, leg: Leg) -> tuple[Array, Array]:
