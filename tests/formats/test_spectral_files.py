@@ -110,3 +110,59 @@ def test_a_damaged_view_is_named(tmp_path):
     (tmp_path / "view_00_01.exr").write_bytes(b"no picture")
     with pytest.raises(vcc.InputError, match=r"view_00_01\.exr cannot be read as a picture"):
         vcc.open_light_field(tmp_path, **CAMERAS)
+
+
+HEADER = """ENVI
+description = {{ anything, = at all }}
+samples = 6
+lines = 5
+bands = 4
+header offset = 3
+data type = {kind}
+interleave = {order}
+byte order = {swapped}
+wavelength units = {unit}
+wavelength = {{ {waves} }}
+"""
+NANOMETRES = "450, 512.5,\n 600, 900"
+
+
+def write_envi(path, values, order, kind, swapped=0, unit="Nanometers", waves=NANOMETRES):
+    """Band by band, line by line, or pixel by pixel, after 3 bytes of something else."""
+    axes = {"bsq": (2, 0, 1), "bil": (0, 2, 1), "bip": (0, 1, 2)}[order]
+    stored = np.dtype(values.dtype).newbyteorder(">" if swapped else "<")
+    path.write_bytes(b"abc" + np.transpose(values, axes).astype(stored).tobytes())
+    text = HEADER.format(kind=kind, order=order, swapped=swapped, unit=unit, waves=waves)
+    path.with_suffix(".hdr").write_text(text, encoding="utf-8")
+
+
+@pytest.mark.parametrize(("order", "swapped"), [("bsq", 0), ("bil", 1), ("bip", 0)])
+def test_envi(tmp_path, order, swapped):
+    for row, column in np.ndindex(2, 2):
+        file = tmp_path / f"view_0{row}_0{column}.{order}"
+        write_envi(file, BANDS[row, column], order, 4, swapped)
+    light_field = vcc.open_light_field(tmp_path, transfer="linear", **CAMERAS)
+    np.testing.assert_allclose(light_field.wavelengths, WAVELENGTHS, rtol=1e-12)
+    np.testing.assert_array_equal(light_field.values, BANDS)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"unit": "parsecs"}, "'parsecs'"),
+        ({"waves": "450, 512.5, 600"}, "3 wavelengths for 4 bands"),
+        ({"waves": "450, 512.5, 600, red"}, "'red'"),
+        ({"kind": 6}, "data type 6"),
+        ({"kind": 1}, "the file has 483"),
+        ({"kind": "many"}, "'many'"),
+    ],
+)
+def test_envi_headers_that_are_wrong_raise(tmp_path, changed, message):
+    for column in range(2):
+        write_envi(tmp_path / f"view_00_0{column}.img", BANDS[0, 0], "bip", **{"kind": 4, **changed})
+    with pytest.raises(vcc.InputError, match=rf"view_00_00\.img.*{message}"):
+        vcc.open_light_field(tmp_path, **CAMERAS)
+    for header in tmp_path.glob("*.hdr"):
+        header.unlink()
+    with pytest.raises(vcc.InputError, match=r"view_00_00\.img.*header, view_00_00\.hdr, is missing"):
+        vcc.open_light_field(tmp_path, **CAMERAS)

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from vcc.files import jpeg_headers
 from vcc.files.declared_sizes import check_declared_size
+from vcc.files.envi import ENDINGS as ENVI
+from vcc.files.envi import read_envi
 from vcc.files.netpbm import read_netpbm
 from vcc.files.npy import read_npy
 from vcc.files.spectral import bands_of, ome
@@ -249,5 +251,6 @@ DECODERS: dict[str, Callable[[Path], NDArray[Any]]] = {
     ".npy": read_npy,
     ".ppm": read_netpbm,
     ".pgm": read_netpbm,
+    **dict.fromkeys(ENVI, read_envi),
 }
 """The decoder for each extension; a decoder may raise any exception."""

@@ -18,11 +18,12 @@ from vcc.base.showing import Shown
 from vcc.files import transfer
 from vcc.files.atomic import said_by_disk
 from vcc.files.destination import Destination, Target
+from vcc.files.envi import ENDINGS as ENVI
 from vcc.files.image_metadata import ImageMetadata, in_png, metadata_of, tiff_tags, write_npy
 from vcc.files.picture_decoders import DECODERS, NOT_OPAQUE, Unsuitable, decode_png
 from vcc.files.spectral import wavelengths_in
 
-READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm")
+READ_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".npy", ".ppm", ".pgm", *ENVI)
 """Extensions that `read_picture` supports."""
 WRITE_ENDINGS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".exr", ".npy")
 """Extensions that `save_picture` supports."""
@@ -41,7 +42,7 @@ _BRIGHT_PERCENTILE = 99.5
 def read_picture(path: str | PathLike[str]) -> tuple[NDArray[Any], int]:
     """Read the samples of a picture as stored: without scaling, and without undoing a transfer curve.
 
-    Supports PNG of 8 and 16 bits, JPEG of 8 bits, TIFF, BMP, OpenEXR, Netpbm and NumPy's .npy. Palettes are
+    Supports PNG of 8 and 16 bits, JPEG of 8 bits, TIFF, BMP, OpenEXR, Netpbm, ENVI and NumPy's .npy. Palettes are
     converted to colours. PNGs of 1, 2 or 4 bits are scaled to 8 (1-bit: 0 and 255), Netpbm of 10 bits to 16. A
     fully opaque alpha channel is dropped; any other raises, because the background is unknown. OpenEXR returns
     the bands of spectral files (``S0.550nm``, shortest first), else the channels R, G, B, or the only channel.
@@ -461,7 +462,9 @@ def _checked(samples: NDArray[Any], path: Path) -> tuple[NDArray[Any], int]:
             f"{path} holds an array of shape {samples.shape}; a picture has rows and columns, "
             "and perhaps channels last"
         )
-    several = path.suffix.lower() not in (".npy", ".exr") and samples.ndim == 3 and samples.shape[2] in (2, 4)
+    several = (
+        path.suffix.lower() not in (".npy", ".exr", *ENVI) and samples.ndim == 3 and samples.shape[2] in (2, 4)
+    )
     if several and wavelengths_in(path) is None:
         opaque = 1 if samples.dtype.kind == "f" else np.iinfo(samples.dtype).max
         if not (samples[..., -1] >= opaque).all():

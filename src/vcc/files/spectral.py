@@ -1,4 +1,4 @@
-"""Wavelengths that pictures state for their channels: spectral OpenEXR, OME-TIFF.
+"""Wavelengths that pictures state for their channels: spectral OpenEXR, OME-TIFF, ENVI.
 
 OpenEXR: channels ``S0.550,000000nm`` of the layout of Fichet et al. 2021 (An OpenEXR layout for spectral images,
 JCGT 10 (3)): the radiance of a band, with the wavelength in metres with a prefix. OME-TIFF: ``EmissionWavelength``
@@ -14,6 +14,8 @@ from xml.etree import ElementTree
 
 from vcc.base.errors import InputError
 from vcc.base.wavelengths import wavelength
+from vcc.files.envi import ENDINGS as ENVI
+from vcc.files.envi import wavelengths_of
 
 _BAND = re.compile(r"S0\.(\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)([num]?)m")
 _PREFIXES = {"": 1.0, "m": 1e-3, "u": 1e-6, "n": 1e-9}
@@ -101,6 +103,8 @@ def wavelengths_in(path: Path) -> tuple[float, ...] | None:
             with tifffile.TiffFile(path) as tiff:
                 text = tiff.ome_metadata
             return None if text is None else emission_wavelengths(text)
+        if ending in ENVI:
+            return wavelengths_of(path)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:  # each library has its own exceptions for damaged files

@@ -18,8 +18,9 @@ from vcc.base.units import mm
 from vcc.base.words import first_few
 from vcc.fields.filling import Filling
 from vcc.fields.grid import Sample
+from vcc.files.envi import ENDINGS as ENVI
 
-PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm")
+PICTURE_ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".ppm", ".pgm", *ENVI)
 """Extensions of files for views."""
 
 MOST_PLACES = 2**20
