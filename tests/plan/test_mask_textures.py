@@ -65,7 +65,7 @@ def test_a_mask_too_fine_for_its_texture_is_told(period, told):
     )
     mask = vcc.Mask(patterns.CosineSum((period, math.inf)), z=51 * mm, name="fine")
     camera = vcc.Camera([vcc.Lens(50 * mm), mask], vcc.Sensor(52 * mm, (4, 1500), 3 * um))
-    cautions = camera.compile(light_field, method="footprints").cautions
+    cautions = camera.compile(light_field, method="footprints", refine=4).cautions
     notes = [caution for caution in cautions if "its texture" in caution]
     assert bool(notes) is told
     if told:

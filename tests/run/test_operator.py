@@ -198,7 +198,7 @@ def test_a_light_field_on_disk_in_pieces(tmp_path, name):
 
 def test_samples_that_take_more_than_the_limit_are_refused(tmp_path):
     stored = save_store(light_field(shape=(9, 9, 60, 60)), tmp_path / "a.zarr")
-    camera = CAMERAS["fine mask"][0]
+    camera = vcc.Camera([LENS], SENSOR)
     limit = 9 * 9 * 60 * 60 * 4
     picture = np.ones(SENSOR.shape)
     op = camera.operator(stored, memory_limit=limit - 1)

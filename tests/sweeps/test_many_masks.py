@@ -20,7 +20,8 @@ AGREEMENT = 1e-6
 """Of the brightest pixel: what sums of hundreds of numbers in single precision are rounded to."""
 
 CASES = {
-    "in mid-path": ({"z": 20 * mm}, {}, {}),
+    "in mid-path": ({"z": 20 * mm, "cells": (5, 4)}, {}, {}),
+    "in mid-path, undivided samples": ({"z": 20 * mm}, {}, {"refine": 1}),
     "near the sensor": ({"z": 48 * mm, "cells": (19, 15), "width": 11 * mm}, {}, {}),
     "off axis, linear": ({"z": 12 * mm, "decentre": (1.3 * mm, -0.7 * mm)}, {}, {"interpolation": "linear"}),
     "divided samples": ({"z": 40 * mm, "width": 14 * mm}, {"kind": np.uint8}, {"refine": 2}),

@@ -60,7 +60,7 @@ class Faces:
     transmission: Pattern | Callable[..., ArrayLike] | None = None
     scatter: Scatter | Kernel | None = None
     terms: tuple[Term, ...] = ()
-    by_ray: RayTransmission | None = None
+    by_ray: RayTransmission | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         given: Any = self.transmission
