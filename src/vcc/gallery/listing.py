@@ -24,6 +24,7 @@ ENTRIES = (
     "dual-pixel",
     "wavefront-coding",
     "diffuser-depth-of-field",
+    "diffusercam",
     "focal-sweep",
     "coded-exposure",
     "cassi",
