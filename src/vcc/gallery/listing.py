@@ -28,6 +28,7 @@ ENTRIES = (
     "focal-sweep",
     "coded-exposure",
     "cassi",
+    "tensor-display",
 )
 """Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which defines an ``ENTRY``."""
 
