@@ -361,7 +361,12 @@ def _findings(measured: Measured) -> Iterator[Finding]:
         measured, "no crop", "dense", "a model without the crop", "it takes light beyond the sensor as dark"
     )
     yield _gain(
-        measured, "far", "dense", "the PSF of a point at infinity", "a PSF scales with distance", least=0.0
+        measured,
+        "far",
+        "dense",
+        "the PSF of a point at infinity",
+        "same weight; a PSF scales with distance",
+        least=0.0,
     )
     yield _gain(
         measured,
