@@ -39,7 +39,7 @@ Array = NDArray[np.float64]
 Kind = Literal["dense", "sparse"]
 
 PITCH = 26 * um
-"""Of the pixels: four of the prototype's, each way."""
+"""Of the pixels."""
 TO_SENSOR = 9 * mm
 OPENING = 40 * PITCH
 DISTANCE = 0.3
