@@ -37,10 +37,12 @@ THUMBNAILS = {
     "dual-pixel": ("difference", (0, 0, 1, 1)),
     "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),
+    "diffusercam": ("recordings", (0.08, 0.2, 0.27, 0.85)),
     "focal-sweep": ("scene-restored", (0, 0.2, 0.5, 0.7)),
     "coded-aperture-real-lens": ("psf", (0.52, 0.03, 0.76, 0.265)),
     "real-lens": ("points", (0.628, 0.036, 0.805, 0.262)),
     "coded-exposure": ("target", (0.68, 0.53, 1, 0.98)),
+    "tensor-display": ("layers", (0.36, 0.05, 0.66, 0.48)),
     "cassi": ("scene", (0.338, 0.033, 0.661, 0.492)),
 }
 """Where the first picture has words on it: which one to take, and what part of it (left, top, right, bottom)."""

@@ -93,9 +93,12 @@ LEFT_OUT: Mapping[str, str] = {
     "light-field-rendering": "it renders views between those of a light field, and has neither lens nor sensor",
     "diffuser-depth-of-field": "its diffusers are random rings defined in Python, which a camera file cannot "
     "hold: open wavefront-coding, and give its plate another surface",
+    "diffusercam": "it has no lens, and its flat target is much nearer than the scene on the bench: put a plate "
+    "with a rough surface before a sensor there",
     "focal-sweep": "its sensor moves during the exposure, which the bench does not support: move the sensor on "
     "the bench, or export a film of a sweep of sensor.z",
     "coded-exposure": "its shutter flutters while the scene moves, and the bench shows static scenes only",
+    "tensor-display": "it shows a light field and records none",
     "cassi": "its scene has many bands, and light fields on the bench have no wavelengths",
 }
 """Entries that are not on the bench, and why."""

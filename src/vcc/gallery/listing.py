@@ -24,9 +24,11 @@ ENTRIES = (
     "dual-pixel",
     "wavefront-coding",
     "diffuser-depth-of-field",
+    "diffusercam",
     "focal-sweep",
     "coded-exposure",
     "cassi",
+    "tensor-display",
 )
 """Names, in the gallery's order. ``a-name`` is the module ``vcc.gallery.a_name``, which defines an ``ENTRY``."""
 
