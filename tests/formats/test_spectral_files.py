@@ -95,6 +95,16 @@ def test_ome_tiff_of_another_kind_raises(tmp_path, stated, axes, message):
         vcc.open_light_field(tmp_path, **CAMERAS)
 
 
+def test_ome_tiff_with_some_wavelengths_has_none_and_says_so(tmp_path):
+    for column in range(2):
+        file = tmp_path / f"view_00_0{column}.tif"
+        write_ome(file, np.ones((3, 5, 6), np.uint16), {"EmissionWavelength": [600, 500, 450]})
+        data = file.read_bytes()
+        file.write_bytes(data.replace(b'EmissionWavelength="450"', b"                        ", 1))
+    with pytest.warns(vcc.ResultWarning, match="2 of 3 channels of an OME-TIFF state an EmissionWavelength"):
+        assert vcc.open_light_field(tmp_path, **CAMERAS).wavelengths is None
+
+
 def test_damaged_ome_xml_raises(tmp_path):
     for column in range(2):
         file = tmp_path / f"view_00_0{column}.tif"

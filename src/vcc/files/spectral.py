@@ -8,11 +8,12 @@ of the channels (OME-XML, openmicroscopy.org).
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.base.wavelengths import wavelength
 from vcc.files.envi import ENDINGS as ENVI
 from vcc.files.envi import wavelengths_of
@@ -64,6 +65,14 @@ def emission_wavelengths(text: str) -> tuple[float, ...] | None:
     channels = ome(text, "Channel")
     stated = [one.get("EmissionWavelength") for one in channels]
     if not channels or None in stated:
+        some = len(stated) - stated.count(None)
+        if some:
+            warnings.warn(
+                f"{some} of {len(stated)} channels of an OME-TIFF state an EmissionWavelength: none is used, since "
+                "all bands of a light field have one. Pass light_field.with_wavelengths(...)",
+                ResultWarning,
+                stacklevel=2,
+            )
         return None
     found = []
     for one, number in zip(channels, stated, strict=True):
