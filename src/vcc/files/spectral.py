@@ -68,7 +68,7 @@ def emission_wavelengths(text: str) -> tuple[float, ...] | None:
         some = len(stated) - stated.count(None)
         if some:
             warnings.warn(
-                f"{some} of {len(stated)} channels of an OME-TIFF state an EmissionWavelength: none is used, since "
+                f"{some} of {len(stated)} channels of an OME-TIFF state an EmissionWavelength: none is used, as "
                 "all bands of a light field have one. Pass light_field.with_wavelengths(...)",
                 ResultWarning,
                 stacklevel=2,
