@@ -131,6 +131,18 @@ def test_sharp_image_and_depth_of_a_plane_are_those_of_a_pinhole(views):
     assert np.allclose(pair.arrays["depth"], distance, rtol=1e-5)
 
 
+def test_diffraction_belongs_to_the_recording_and_not_to_its_truth():
+    scene = field_of(RANDOM.random((3, 3, 60, 70), np.float32)).with_wavelengths((0.9e-6,))
+    camera = camera_of().replace(sensor=vcc.Sensor(camera_of().sensor.z, (40, 48), 4e-6))
+    by_rays, by_waves = (
+        pair_of(recipe_of(camera, scene, how=vcc.How(threads=1, diffraction=waves))) for waves in (False, True)
+    )
+    np.testing.assert_array_equal(by_waves.arrays["sharp"], by_rays.arrays["sharp"])
+    assert not np.allclose(by_waves.arrays["recording"], by_rays.arrays["recording"], rtol=1e-3)
+    with pytest.raises(vcc.InputError, match="traced by rays"):
+        recipe_of(camera, scene, truth=("psf",), psf_distances=(1.0,), how=vcc.How(diffraction=True))
+
+
 def test_recordings_are_in_units_of_the_sharp_image_with_the_noise_of_their_photons():
     scene = field_of(np.full((5, 7, 50, 60, 3), 0.6, np.float32))
     electronics = vcc.Electronics(bit_depth=16, gain=1.0, full_well=60000.0, color_filter=None)

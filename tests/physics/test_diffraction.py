@@ -293,6 +293,7 @@ GRAIN = np.random.default_rng(0).integers(0, 2, (64, 64)).astype(float)
         ([LENS, vcc.Mask(GRAIN, width=4 * mm, z=47 * mm)], {}, "over the sensor"),
         ([LENS, vcc.Mask(GRAIN, width=4 * mm, z=F)], {}, "lies at the image"),
         ([LENS, vcc.AngleFilter(vcc.patterns.Circle(0.1), z=10 * mm)], {}, "by its direction"),
+        ([LENS, vcc.RayFilter(lambda x, y, s, t: 0.5 + 0 * x * s, z=10 * mm)], {}, "by its direction"),
         ([LENS], {"between_views": "depth"}, "do not go together"),
         ([LENS], {"diffraction": "yes"}, "True or False"),
     ],

@@ -97,6 +97,10 @@ class Recipe(Brief):
             raise InputError(f"psf_size is odd, so that there is a middle pixel, not {self.psf_size}")
         for distance in self.psf_distances:
             checks.above_zero("psf_distances", distance, unit="m", infinite=True)
+        if "psf" in self.truth and self.how.diffraction:
+            raise InputError(
+                'truth="psf" is traced by rays, and diffraction=True records by waves: leave one of them out'
+            )
         if ("psf" in self.truth) != bool(self.psf_distances):
             raise InputError(
                 'truth="psf" and psf_distances belong together: the point spreads of points at these distances'

@@ -209,7 +209,8 @@ class Recorder(Brief):
         arriving = scene.pinhole.transformed(rays)
         _across_sensor(arriving.frame.linear[:2, 2:])
         sensor = replace(camera.sensor, z=0.0, electronics=None, angular_response=None)
-        made = Camera([], sensor).capture(arriving, replace(self.recipe.how, method="footprints")).to_numpy()
+        how = replace(self.recipe.how, method="footprints", diffraction=False)
+        made = Camera([], sensor).capture(arriving, how).to_numpy()
         # A pixel gets radiance × the sample's volume in phase space / its area on the sensor.
         cell = abs(np.linalg.det(arriving.frame.linear[:2, 2:]))
         made = made * np.float32(cell / arriving.sample_volume)

@@ -27,10 +27,10 @@ from vcc.optics.train import Stage, Train
 Array = NDArray[np.float64]
 
 POINTS = 512
-"""Points of a pupil along each side of the stop: the transfer function of a disc is accurate to 10⁻⁴.
-Points, not
+"""Points of a pupil along each side of the stop: the transfer function of a disc is accurate to 10⁻⁴. Points, not
 means over cells: the square of a mean would darken every rim."""
 SINGULAR = 1e-12
+"""Determinant, relative to the largest element squared, below which a 2×2 map has no inverse."""
 AT_SENSOR = 1e-6
 """Share of the opening that light of a point in focus fills at a mask, below which the mask lies at the image."""
 
@@ -230,7 +230,7 @@ def _rays_otf(places: Array, weights: Array, size: int, within: int) -> NDArray[
 def _check_elements(train: Train) -> None:
     for stage in train.stages:
         label = stage.element.label
-        if stage.term is not None:
+        if stage.term is not None or stage.faces.by_ray is not None:
             raise InputError(
                 f"diffraction: {label} passes light by its direction, which waves through the stop do not have "
                 "at one place: leave diffraction out, or leave the element out"
@@ -290,9 +290,7 @@ def _traced(train: Train, rays: Array) -> tuple[Array, Array]:
     light = np.ones(rays.shape[:-1])
     for stage in light_stages(train):
         rays = np.asarray(stage.approach(rays))
-        x, y = (rays[..., axis] - stage.element.decentre[axis] for axis in (0, 1))
-        if stage.faces.pattern is not None:
-            light = light * np.asarray(stage.faces.pattern(x, y), dtype=np.float64)
+        light = light * stage.share(rays)
         # Dark rays go on as well: the path is summed across dark cells.
         bent, passed = stage.crossed(rays)
         rays = np.where(passed[..., None] > 0, bent, rays)
