@@ -69,12 +69,17 @@ class VisiblePupil(Brief):
         height = np.hypot(x, y)
         cosine, sine = np.where(height > 0, x / np.maximum(height, 1e-300), 1.0), y / np.maximum(height, 1e-300)
         along, aside = cosine * a + sine * b, cosine * b - sine * a
-        low, at = _node(height, len(self.table))
-        middle, half, across = ((1 - at) * self.table[low, n] + at * self.table[low + 1, n] for n in range(3))
+        middle, half, across = self.ellipse(height)
         out = self.outward(height, along, aside)
         factor = half * across * out**2
         along, aside = middle + half * out * along, across * out * aside
         return cosine * along - sine * aside, sine * along + cosine * aside, factor
+
+    def ellipse(self, height: Array) -> tuple[Array, Array, Array]:
+        """Middle, half and across for heights in steps."""
+        low, at = _node(height, len(self.table))
+        middle, half, across = ((1 - at) * self.table[low, n] + at * self.table[low + 1, n] for n in range(3))
+        return middle, half, across
 
     def outward(self, height: Array, along: Array, aside: Array) -> Array:
         """ρ for heights in steps and directions of points."""
@@ -122,6 +127,8 @@ def tables_of(passes: Passes, farthest: float) -> Array | None:
     # The coarse points they were found at must not show: bends from height to height cost room.
     smooth = np.polynomial.polynomial.polyfit(heights[lit] / farthest, ellipses[lit], min(4, len(lit) - 1))
     ellipses = np.asarray(np.polynomial.polynomial.polyval(heights[lit] / farthest, smooth).T, dtype=np.float64)
+    if (ellipses[:, 1:] <= 0).any():
+        return None
     table[lit, :3] = ellipses
     table[lit, 3:] = _outlines(passes, heights[lit], ellipses)
     # Where no light arrives, the part that the nearest height sees does no harm.
@@ -150,11 +157,9 @@ def _outlines(passes: Passes, heights: Array, ellipses: Array) -> Array:
     middle, half, across = (ellipses[:, n, None] for n in range(3))
 
     def passed(out: Array, turn: Array) -> NDArray[np.bool_]:
-        along, aside = (
-            turn / np.hypot(turn, 1 - np.abs(turn)),
-            (1 - np.abs(turn)) / np.hypot(turn, 1 - np.abs(turn)),
-        )
-        a, b = middle + half * out * along, across * out * aside
+        aside = 1 - np.abs(turn)  # see `_turn`, here from −1 to 1
+        size = np.hypot(turn, aside)
+        a, b = middle + half * out * turn / size, across * out * aside / size
         points = np.stack([np.broadcast_to(heights[:, None], a.shape), a, b], axis=-1)
         return passes(points.reshape(-1, 3)).reshape(a.shape)
 
@@ -169,10 +174,8 @@ def _outlines(passes: Passes, heights: Array, ellipses: Array) -> Array:
         here = passed(out, turn)
         low, high = np.where(here, out, low), np.where(here, high, out)
     bent = np.zeros_like(high)
-    for axis, share in (
-        (0, 0.25),
-        (1, 0.5),
-    ):  # up to a half of the second difference at a corner, an eighth elsewhere
+    # Between nodes a corner is off by up to a half of the second difference, a smooth line by an eighth.
+    for axis, share in ((0, 0.25), (1, 0.5)):
         if high.shape[axis] > 2:
             second = share * np.abs(np.diff(high, 2, axis=axis))
             bent += np.pad(second, [(1, 1) if n == axis else (0, 0) for n in (0, 1)], mode="edge")
@@ -187,9 +190,9 @@ def _enclosing(found: VisiblePupil, passes: Passes, farthest: float) -> VisibleP
     a, b = away * np.cos(angle), away * np.sin(angle)
     lit = passes(np.stack([height, a, b], axis=-1))
     place = height[lit] / farthest * (HEIGHTS - 1)
-    low, at = _node(place, HEIGHTS)
-    middle, half, across = ((1 - at) * found.table[low, n] + at * found.table[low + 1, n] for n in range(3))
+    middle, half, across = found.ellipse(place)
     along, aside = (a[lit] - middle) / half, b[lit] / across
+    low, _ = _node(place, HEIGHTS)
     left, _ = _node(_turn(along, aside) * (DIRECTIONS - 1), DIRECTIONS)
     for _ in range(8):
         beyond = ROOM * np.hypot(along, aside) / found.outward(place, along, aside)
@@ -197,9 +200,9 @@ def _enclosing(found: VisiblePupil, passes: Passes, farthest: float) -> VisibleP
             return None
         outside = beyond > 1
         if not outside.any():
-            break
+            return found
         larger = np.ones(found.table.shape)
         for row, column in ((0, 3), (0, 4), (1, 3), (1, 4)):
             np.maximum.at(larger, (low[outside] + row, left[outside] + column), ROOM * beyond[outside])
         found = replace(found, table=found.table * larger)
-    return found
+    return None
