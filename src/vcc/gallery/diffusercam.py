@@ -126,7 +126,7 @@ def devices() -> dict[str, Device]:
 
 @dataclass(frozen=True, eq=False)
 class Laboratory:
-    """Targets, recordings and the tuning of the decoder, for one size.
+    """Targets, recordings and the tuning of the decoder, for sizes that set the computing time.
 
     Args:
         side: pixels of the target and of the sensor along a side.
@@ -135,10 +135,10 @@ class Laboratory:
         steps: iterations of the decoder.
     """
 
-    side: int
-    samples: int
-    rays: int
-    steps: int
+    side: int = 128
+    samples: int = 2048
+    rays: int = 600
+    steps: int = 100
 
     @property
     def sensor(self) -> Sensor:
@@ -248,25 +248,12 @@ class Measured:
         return f"{mine:.1f} dB against {its:.1f} dB"
 
 
-@dataclass(frozen=True)
-class Run:
-    """Record a dense and a sparse target with the diffuser and with the controls, and recover both.
-
-    Args:
-        side: pixels of the targets and of the sensor along a side.
-        samples: rays per pixel of a recording.
-        rays: across the opening, for point spread functions.
-        steps: iterations of the decoder.
-    """
-
-    side: int = 128
-    samples: int = 2048
-    rays: int = 600
-    steps: int = 100
+@dataclass(frozen=True, eq=False)
+class Run(Laboratory):
+    """Record a dense and a sparse target with the diffuser and with the controls, and recover both."""
 
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Make the dense target of the middle view of a light field, and measure."""
-        laboratory = Laboratory(self.side, self.samples, self.rays, self.steps)
         shape, every = (self.side, self.side), devices()
         advance = Steps(progress, 2 * 4 + 1)
         progress(0, advance.total)
@@ -278,7 +265,7 @@ class Run:
         widths: dict[Kind, int] = {}
         error = math.nan, math.nan
         for kind, target in targets.items():
-            tuned = {name: laboratory.tuned(device, blurs[name], kind) for name, device in every.items()}
+            tuned = {name: self.tuned(device, blurs[name], kind) for name, device in every.items()}
             pinhole = max((f"pinhole {n}" for n in PINHOLES), key=lambda name: tuned[name][1])
             widths[kind] = int(pinhole.split()[1])
             for words, name in (
@@ -287,15 +274,15 @@ class Run:
                 ("pinhole", pinhole),
                 ("lens", "lens"),
             ):
-                image = laboratory.captured(every[name], target)
-                recording = laboratory.recorded(every[name], image)
+                image = self.captured(every[name], target)
+                recording = self.recorded(every[name], image)
                 found[words, kind] = self._recovered(recording, blurs[name], tuned[name][0], target)
                 if (name, kind) == ("diffuser", "dense"):
-                    error = laboratory.model_error(image, blurs[name], target)
+                    error = self.model_error(image, blurs[name], target)
                 advance()
         diffused, target = found["diffuser", "dense"], targets["dense"]
         uncropped = CroppedBlur(kernels["diffuser"], shape, cropped=False)
-        weight, _ = laboratory.tuned(every["diffuser"], uncropped, "dense")
+        weight, _ = self.tuned(every["diffuser"], uncropped, "dense")
         found["no crop", "dense"] = self._recovered(diffused.recording, uncropped, weight, target)
         found["far", "dense"] = self._recovered(diffused.recording, farther, diffused.weight, target)
         advance()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,8 +65,12 @@ REACH = BLUR * SLOPE / SIDE
 """|1/Z − 1/FOCUS| of the nearest and of the farthest objects, 1/m."""
 
 
-def distance_of(blur: float) -> float:
-    """The distance of objects with a blur through the whole square, pixels; positive before the focus, metres."""
+def distance_of(blur: Any) -> Any:
+    """The distance, metres, of objects with a blur through the whole square, pixels, positive before the focus.
+
+    Args:
+        blur: a number or an array.
+    """
     return 1 / (1 / FOCUS + blur * SLOPE / SIDE)
 
 

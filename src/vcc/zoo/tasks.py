@@ -154,11 +154,7 @@ def _distances(scene: Scene) -> Array:
         raise InputError(
             f"the scene {scene.name} has no map of depth in its middle view, which the task depth needs"
         )
-    return np.asarray(_away(scene.blur))
-
-
-def _away(blur: Array) -> Array:
-    return np.asarray(1 / (1 / FOCUS + blur * SLOPE / SIDE))
+    return np.asarray(distance_of(scene.blur))
 
 
 def _blur(distance: Array) -> Array:
@@ -193,7 +189,7 @@ def by_defocus(recorded: Recorded, smoothed: bool = True) -> Array:
 
 
 def by_blocks(recorded: Recorded) -> Array:
-    """Return the same, each block alone."""
+    """As `by_defocus`, with each block alone."""
     return by_defocus(recorded, smoothed=False)
 
 

@@ -89,8 +89,8 @@ def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
         InputError: one of them moves such an edge, named, or belongs to a map of rays.
     """
     for name in wanted:
-        number = int(name.removeprefix("steps[").split("]")[0]) if name.startswith("steps[") else 0
-        if name.startswith("steps[") and isinstance(core.steps[number], steps.MapRays):
+        number = _step_of(name)
+        if number is not None and isinstance(core.steps[number], steps.MapRays):
             raise InputError(
                 f"there is no derivative to {name}: the map of a lens known by a table of rays is fitted to "
                 "them, and stays as it is. Learn the lens's place, and what stands around it"
@@ -119,6 +119,11 @@ def _moves(core: Rays, edge: _Edge, name: str) -> bool:
     return _moved_from(core, name) <= n or (n < len(core.steps) and _names(name, n, core.steps[n], BORDERS))
 
 
+def _step_of(name: str) -> int | None:
+    """The number of the step that a parameter belongs to; None if it belongs to none."""
+    return int(name.removeprefix("steps[").split("]")[0]) if name.startswith("steps[") else None
+
+
 def _moved_from(core: Rays, name: str) -> int:
     """The first step that rays meet at another place when a parameter changes; beyond the last step if none."""
     never = len(core.steps) + 1
@@ -130,8 +135,7 @@ def _moved_from(core: Rays, name: str) -> int:
         scatters = [n + 1 for n, step in enumerate(core.steps) if isinstance(step, steps.Unscatter)]
         made_up_for = isinstance(core.aim, Window) and core.aim.slope_from_scatter
         return 0 if made_up_for else min(scatters, default=never)
-    if name.startswith("steps["):
-        number = int(name.removeprefix("steps[").split("]")[0])
+    if (number := _step_of(name)) is not None:
         return number + 1 if isinstance(core.steps[number], MOVING) else never
     return 0
 
