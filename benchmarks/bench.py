@@ -61,12 +61,12 @@ WATCH = """
 (() => {
   const bench = () => document.querySelector("vcc-bench")?.bench;
   const seen = (window.seen = { inputs: [], drawn: [], ended: 0 });
-  let turn = -1, next = null;
+  let shown = null;
   window.addEventListener("pointermove", (event) => {
     const now = bench();
-    if (!now || (now.turn === turn && now.next === next)) return;
-    [turn, next] = [now.turn, now.next];
-    seen.inputs.push([performance.timeOrigin + event.timeStamp, turn + (next ? 1 : 0)]);
+    if (!now || now.document === shown) return;  // a hand that rests asks for the whole picture of the same place
+    shown = now.document;
+    seen.inputs.push([performance.timeOrigin + event.timeStamp, now.turn + (now.next ? 1 : 0)]);
   });
   window.addEventListener("pointerup", (event) => { seen.ended = performance.timeOrigin + event.timeStamp; });
   const draw = CanvasRenderingContext2D.prototype.drawImage;

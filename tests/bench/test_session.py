@@ -450,6 +450,10 @@ def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_
     assert client.at_rest()["turn"] == 3
     assert made[:2] == [COARSER[0], WHOLE]
     assert WHOLE not in made[2:]  # of what is the same again none is made
+    # at a place of which nothing is shown yet, the quick picture comes first
+    client.do("set", where=["sensor", "z"], value="54 mm", moving=True, rests=True, turn=4)
+    pictures = [client.until("picture")[0] for _ in range(2)]
+    assert [(each["turn"], each["coarse"]) for each in pictures] == [(4, True), (4, False)]
     client.close()
 
 

@@ -20,10 +20,12 @@ from vcc.bench.pace import MOST_KINDS, Pace
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken, out_of_focus, take
 from vcc.bench.side import scene_distances
 from vcc.files.camera_reading import TrainAsWritten
-from vcc.plan.following import Parts
+from vcc.plan.following import Draft, Parts
 from vcc.plan.parallax_rule import vergences
 from vcc.plot.fans import focused_distance
 
+DRAFT = Draft(lasting=20, error=0.01)
+"""Of the plans of coarse images: a hundredth of white is not seen in an image that moves."""
 SLOW = 0.4
 """Expected time, seconds, above which a coarse image is shown before the whole one."""
 
@@ -36,11 +38,18 @@ class Wanted:
         turn: the client's number of the message that requested it.
         moving: whether it belongs to a drag.
         coarse_shown: whether its coarse version was shown already.
+        rests: of a drag, whether the hand holds still: the whole image follows.
     """
 
     turn: int
     moving: bool
     coarse_shown: bool = False
+    rests: bool = False
+
+    def then(self, coarse: bool) -> Wanted | None:
+        """What is wanted once this is shown, coarse or not."""
+        whole = coarse and (self.rests or not self.moving)
+        return Wanted(self.turn, moving=False, coarse_shown=True) if whole else None
 
 
 class Imaging:
@@ -61,6 +70,7 @@ class Imaging:
         self._parts: dict[Fineness, Parts] = {}
         self._rehearsals: dict[Hashable, list[tuple[bool, Fineness]]] = {}
         self._of: tuple[Document, Field] | None = None
+        self._moving = False
         self.taken: Taken | None = None
 
     # --- the image of the document ---
@@ -71,8 +81,11 @@ class Imaging:
         Raises:
             InputError: see `vcc.bench.picture.take`.
         """
-        if self.taken is not None and not self.taken.coarse and self._of == self._lit():
+        if self.taken is not None and not self.taken.coarse and self.is_shown():
             return self.taken
+        if wanted.moving and not self._moving:
+            self._parts.clear()  # what was decided for the place at which an earlier drag ended
+        self._moving = wanted.moving
         fineness, kind = WHOLE, self._kind()
         slow = not wanted.coarse_shown and (self._pace.seconds(kind) or math.inf) > SLOW
         if wanted.moving or slow:
@@ -104,6 +117,10 @@ class Imaging:
             raise InputError("there is no image yet")
         return self.taken
 
+    def is_shown(self) -> bool:
+        """Whether the newest image is of the present document."""
+        return self.taken is not None and self._of == self._lit()
+
     def _lit(self) -> tuple[Document, Field]:
         """The document without what changes only how its image is shown, and its light field."""
         return replace(self._editing.document, exposure=None), self._field
@@ -122,7 +139,7 @@ class Imaging:
         """The image of a document; None uses the present one."""
         document, described = document or self._editing.document, described or self._editing.described
         field = self._editing.offered.field(document.light_field)
-        kept = self._parts.setdefault(fineness, Parts(self._check))
+        kept = self._parts.setdefault(fineness, Parts(self._check, None if fineness == WHOLE else DRAFT))
         waited = 0.0
         with self._turn.held(self._check) as let_pass:
 

@@ -15,7 +15,7 @@ the same machine needs as much again for each."""
 CLOSE = 1.3
 """A finer image is made in any case if it takes up to this times the quickest, or this times its processor
 time."""
-BESIDES = 0.010
+BESIDES = 0.030
 """Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
 """Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
@@ -39,7 +39,7 @@ class _Times:
         recent: a running mean.
         planning: the part of it before the plan was ready.
         least: the shortest.
-        work: the least processor time, which a busy machine does not change.
+        work: a running mean of the processor time, which a busy machine hardly changes.
         at: the clock at the newest.
     """
 
@@ -88,8 +88,9 @@ class Pace:
             weight = LONGER if took > before.recent else SHORTER
             before.recent += weight * (took - before.recent)
             before.planning += weight * (planning - before.planning)
-            before.least, before.work = min(before.least, took), min(before.work, taken.processor)
-            before.at = now
+            weight = LONGER if taken.processor > before.work else SHORTER
+            before.work += weight * (taken.processor - before.work)
+            before.least, before.at = min(before.least, took), now
             if took > BUSY * before.least:
                 self._busy.add(fineness)
             elif took < FREE * before.least and fineness in self._busy:

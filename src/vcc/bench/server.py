@@ -345,6 +345,7 @@ def run(
             log_level="critical",
             ws="websockets-sansio",
             ws_max_size=LARGEST_MESSAGE,
+            ws_per_message_deflate=False,  # images are compressed already, and the time counts in a drag
             timeout_graceful_shutdown=0,
             limit_concurrency=8 * MOST_CLIENTS,
         )

@@ -252,7 +252,8 @@ class Session:
         moving, rests = bool(message.get("moving", False)), bool(message.get("rests", False))
         self._changed_by(message, self._editing.set(message), moving)
         if moving and rests:  # a hand that holds still sees the whole image, until it moves on
-            self._wanted = Wanted(turn_of(message), moving=False, coarse_shown=True)
+            turn, shown = turn_of(message), self._imaging.is_shown()
+            self._wanted = Wanted(turn, moving=not shown, coarse_shown=shown, rests=not shown)
 
     def _do_add(self, message: Json) -> None:
         self._editing.add(message)
@@ -387,7 +388,7 @@ class Session:
             self._tell("no picture", {"turn": wanted.turn, "words": str(_in_words(error))})
             return
         self._tell_picture(taken, wanted)
-        self._wanted = replace(wanted, coarse_shown=True) if taken.coarse and not wanted.moving else None
+        self._wanted = wanted.then(taken.coarse)
         if not taken.coarse and not wanted.moving and not self._inbox.supersedes(False):
             self._tell("notes", {"turn": wanted.turn, "notes": self._imaging.notes(taken)})
 

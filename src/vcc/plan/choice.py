@@ -215,8 +215,17 @@ class _Making:
         """Requested rays that the light field lacks, and a note as text."""
         if self.chosen:
             return self.chosen.missing
-        asked = AskedLight.of(self.train, self.grid)
-        return asked.missing, asked.words
+
+        def asked() -> tuple[Missing, str]:
+            light = AskedLight.of(self.train, self.grid)
+            return light.missing, light.words
+
+        return self.parts.decision("missing", lambda: self._alike, asked)
+
+    @property
+    def _alike(self) -> object:
+        """What cameras have in common that share decisions."""
+        return self.grid.shape, self.train.sensor.shape, self.elements, self.how
 
     @property
     @cached

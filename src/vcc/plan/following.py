@@ -138,15 +138,34 @@ def _differences(each: Field[Any], mine: Any, others: Any, about: str) -> tuple[
 # --- costly results
 
 
+@dataclass(frozen=True)
+class Draft:
+    """Request for plans that are made quickly, one after the other, for images that are seen for a moment.
+
+    Args:
+        lasting: plans for which a decision about accuracy lasts.
+        error: share of the light from which on cells of views and samples are divided.
+    """
+
+    lasting: int
+    error: float
+
+
 class Parts:
     """Costly parts of plans, cached by all that they depend on and reused by plans of nearby cameras.
 
     Args:
         check: called before each part; an exception that it raises ends the planning.
+        draft: if the plans are drafts.
+
+    Attributes:
+        draft: as given.
     """
 
-    def __init__(self, check: Callable[[], None] | None = None) -> None:
-        self._check = check
+    def __init__(self, check: Callable[[], None] | None = None, draft: Draft | None = None) -> None:
+        self._check, self.draft = check, draft
+        self._decided: dict[Hashable, Any] = {}
+        self._plans = 0
         self._kept: dict[Hashable, Any] = {}
         self._used: dict[Hashable, Any] | None = None
 
@@ -172,10 +191,32 @@ class Parts:
             self._used[key] = self._kept[key] = found
         return found
 
+    def decision(self, what: str, of: Callable[[], object], make: Callable[[], Made]) -> Made:
+        """Decide about accuracy; of drafts, several share a decision.
+
+        An older decision makes a plan less accurate, or slower, than it could be.
+
+        Args:
+            what: is decided.
+            of: returns what cameras must have in common to share it.
+            make: decides.
+        """
+        self.check()
+        if self.draft is None:
+            return make()
+        key = what, content(of())
+        if key not in self._decided:
+            self._decided[key] = make()
+        found: Made = self._decided[key]
+        return found
+
     @contextmanager
     def keeping(self) -> Iterator[None]:
         """Keep the parts of the plan that is made within the context, and only these."""
         self._used = {}
+        if self.draft is not None and self._plans % self.draft.lasting == 0:
+            self._decided.clear()
+        self._plans += 1
         try:
             yield
         finally:

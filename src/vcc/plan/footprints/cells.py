@@ -174,6 +174,7 @@ def divide_views(
     geometry: Geometry,
     refine: int | str,
     detail: Detail = DETAIL,
+    least: float = ERROR,
 ) -> CellDivision:
     """Choose how views' cells are divided so that fine masks keep their detail.
 
@@ -188,13 +189,14 @@ def divide_views(
         geometry: of the samples.
         refine: "auto", or the number requested.
         detail: detail measured on the patterns.
+        least: error that counts, a share of the light.
     """
     if refine == 1:
         return CellDivision(1, False)
-    parts = 1
+    parts, fine = 1, FINE_DETAIL_IN_VIEW * least / ERROR
     for plane in (*view_planes, *path_planes):
         while parts < min(LARGEST_REFINEMENT, max(between.gap_filled)):
-            if detail.lost(plane, np.zeros(2), _cell(plane, between) / parts) < FINE_DETAIL_IN_VIEW:
+            if detail.lost(plane, np.zeros(2), _cell(plane, between) / parts) < fine:
                 break
             parts *= 2
     spread = parts > 1
@@ -212,7 +214,7 @@ def divide_views(
             )
         )
     where = _where_joint([group for group, even in zip(groups, apart.even, strict=True) if not even], geometry)
-    cut = [(plane, _misplaced(plane, between, geometry, detail)) for plane in path_planes]
+    cut = [(plane, _misplaced(plane, between, geometry, detail, least)) for plane in path_planes]
     misplaced = max((error for _, error in cut), default=0.0)
 
     def chosen(share: float, left: Callable[[int], float]) -> tuple[int, float]:
@@ -221,16 +223,16 @@ def divide_views(
         most = 2 * LARGEST_CHOSEN_DIVISION if 0 < 4 * share <= 1 and not spread else LARGEST_CHOSEN_DIVISION
         most = most if refine == "auto" else max(most, int(refine))
         finer = parts
-        while finer < most and left(finer) > ERROR:
+        while finer < most and left(finer) > least:
             finer *= 2
         return finer, left(finer)
 
     finer, error = chosen(apart.share, lambda parts: max(apart.error(parts), misplaced))
-    if misplaced > ERROR:
+    if misplaced > least:
         all_cut = chosen(1.0, lambda parts: max(apart.error(parts), misplaced / parts**1.5))
         if all_cut[1] <= error:  # otherwise dividing few cells further leaves less error
             finer, error = all_cut
-            where = where | geometry.varying([plane for plane, error in cut if error > ERROR])
+            where = where | geometry.varying([plane for plane, error in cut if error > least])
     if spread:  # a tent reaches over divided and undivided cells
         return CellDivision(finer, True, error=error)
     return CellDivision(parts, False, finer, where, error)
@@ -246,7 +248,9 @@ def _no_error(parts: int) -> float:
     return 0.0
 
 
-def _misplaced(plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail) -> float:
+def _misplaced(
+    plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail, least: float = ERROR
+) -> float:
     """The error of treating light through a part of a view's cell as light through the centre of the cell.
 
     The light falls next to its place on the sensor if the images formed by different parts of the cell lie apart.
@@ -256,7 +260,7 @@ def _misplaced(plane: Plane, between: BetweenViews, geometry: Geometry, detail: 
     sample, cell = np.abs(plane.sample_step).sum(axis=1), _cell(plane, between)
     shadow = np.min(cell * pixels / np.maximum(sample, 1e-300))
     most = MISPLACED * float(np.abs(apart).sum(axis=1).max()) / max(float(shadow), 1.0)
-    return most * math.sqrt(max(detail.lost(plane, np.zeros(2), cell), 0.0)) if most > ERROR else 0.0
+    return most * math.sqrt(max(detail.lost(plane, np.zeros(2), cell), 0.0)) if most > least else 0.0
 
 
 def _cell(plane: Plane, between: BetweenViews) -> Array:
@@ -301,6 +305,7 @@ def divide_samples(
     views: CellDivision,
     refine: int | str,
     detail: Detail = DETAIL,
+    least: float = ERROR,
 ) -> SampleDivision:
     """Choose into how many parts a sample is divided each way, so that a mask near the sensor stays sharp.
 
@@ -314,6 +319,7 @@ def divide_samples(
         views: how the views' cells are divided.
         refine: "auto", or the number requested.
         detail: detail measured on the patterns.
+        least: error that counts, a share of the light.
     """
     size = float(np.abs(geometry.on_sensor[:, 2:]).sum(axis=1).max())
 
@@ -326,7 +332,7 @@ def divide_samples(
         hard = has_edges(plane.pattern)
         touching = hard and bool((penumbra < sample).any())
         error = math.sqrt(lost) * (SPILT * size / parts if hard else 1.0)
-        if not touching and error > ERROR:  # the filter compensates the loss of smooth shadows
+        if not touching and error > least:  # the filter compensates the loss of smooth shadows
             error *= min(SMOOTH * max(detail.lost(plane, np.zeros(2), sample), 0.0) ** 2, 1.0)
         elif not hard:
             error = 0.0
@@ -339,7 +345,7 @@ def divide_samples(
     if refine == "auto" and views.finer >= LARGEST_CHOSEN_DIVISION:  # parts of cells times parts of samples cost
         most = LARGEST_CHOSEN_DIVISION
     for number in range(len(planes)):
-        while fine < most and left(number, fine).error > ERROR:
+        while fine < most and left(number, fine).error > least:
             fine = min(2 * fine, most)
     found = [left(number, fine) for number in range(len(planes))]
     return SampleDivision(fine, max(each.error for each in found), any(each.hard for each in found))

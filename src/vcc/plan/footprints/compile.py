@@ -33,6 +33,7 @@ from vcc.plan.footprints.around import (
     filled,
 )
 from vcc.plan.footprints.cells import (
+    ERROR,
     Detail,
     Geometry,
     SampleDivision,
@@ -292,13 +293,41 @@ class ByFootprints:
     def choose_cells(self) -> CellDivision:
         """How the cells of views are divided."""
         absorbing = self.absorbing
-        return divide_views(absorbing.at_views, absorbing.in_path, self.between, self.geometry, self.how.refine)
+        return self.parts.decision(
+            "cells",
+            lambda: self._alike,
+            lambda: divide_views(
+                absorbing.at_views,
+                absorbing.in_path,
+                self.between,
+                self.geometry,
+                self.how.refine,
+                least=self._least_error,
+            ),
+        )
+
+    @property
+    def _least_error(self) -> float:
+        """The error of a division that counts."""
+        return ERROR if self.parts.draft is None else self.parts.draft.error
+
+    @property
+    def _alike(self) -> object:
+        """What cameras have in common that share decisions."""
+        absorbing = self.absorbing
+        kinds = [element.kind for element in self.train.elements]
+        return self.grid.shape, self.sensor.shape, kinds, len(absorbing.at_views), len(absorbing.in_path), self.how
 
     @property
     @cached
     def choose_samples(self) -> SampleDivision:
         """How samples are divided."""
-        return divide_samples(self.absorbing.in_path, self.geometry, self.choose_cells, self.how.refine)
+        in_path, refine = self.absorbing.in_path, self.how.refine
+        return self.parts.decision(
+            "samples",
+            lambda: self._alike,
+            lambda: divide_samples(in_path, self.geometry, self.choose_cells, refine, least=self._least_error),
+        )
 
     @property
     @cached
@@ -417,7 +446,12 @@ class ByFootprints:
     @cached
     def choose_sharpening(self) -> SharpeningChoices | None:
         """How the loss of sharpness by interpolation is compensated; None: not at all."""
-        return Sharpened.choose(self.core, self.grid.sample) if self.sharp else None
+        if not self.sharp:
+            return None
+        across = self.core.step[[0, 1], [1, 0]].any()
+        return self.parts.decision(
+            "sharpening", lambda: (self._alike, across), lambda: Sharpened.choose(self.core, self.grid.sample)
+        )
 
     @property
     def gaps(self) -> tuple[float, float]:
