@@ -63,3 +63,21 @@ def test_drafts_of_a_camera_that_turns_do_not_keep_filters_along_its_rows(light_
         best = compile_best(train, light_field.grid)
         found, true = (drive(plan, light_field, None, None).values for plan in (quick, best))
         np.testing.assert_allclose(found, true, atol=1e-6 * true.max())
+
+
+def test_drafts_through_a_real_lens_share_what_the_sensor_sees_of_its_pupil_and_lose_no_light():
+    lens = vcc.load_lens("double-gauss-50mm", model="real", wavelength=540e-9)
+    scene = demo_scene().light_field((5, 5), (40, 60), spacing=6 * mm, slope_per_pixel=0.01, focus_distance=1.3)
+    even = scene.replaced(np.full(scene.values.shape, 0.5, np.float32))
+    draft = Parts(None, Draft(lasting=20, error=0.01))
+    camera = vcc.Camera([lens], vcc.Sensor(lens.length + 60 * mm, (24, 36), 1 * mm)).focused_at(1.3)
+    for moved in (0.0, 0.3 * mm, 4 * mm):
+        sensor = vcc.Sensor(camera.sensor.z + moved, (24, 36), 1 * mm)
+        train = Train((lens,), sensor)
+        with draft.keeping():
+            quick = compile_best(train, even.grid, None, draft)
+        best = compile_best(train, even.grid)
+        found, true = (drive(plan, even, None, None) for plan in (quick, best))
+        noise = 3 * (found.sampling_error + true.sampling_error) / np.sqrt(24 * 36)  # of the mean over pixels
+        assert abs(found.values.mean() - true.values.mean()) < noise + 0.01 * true.values.mean()
+    assert quick.core.aim.visible is not None
