@@ -29,7 +29,7 @@ def test_a_decision_lasts_for_so_many_drafts_and_only_for_drafts():
 
     def decided(parts, of=1):
         with parts.keeping():
-            return parts.decision("a", lambda: of, lambda: made.append(of) or len(made))
+            return parts.decision("a", of, lambda: made.append(of) or len(made))
 
     drafts = Parts(None, Draft(lasting=3, error=0.01))
     assert [decided(drafts) for _ in range(7)] == [1, 1, 1, 2, 2, 2, 3]

@@ -220,7 +220,7 @@ class _Making:
             light = AskedLight.of(self.train, self.grid)
             return light.missing, light.words
 
-        return self.parts.decision("missing", lambda: self._alike, asked)
+        return self.parts.decision("missing", self._alike, asked)
 
     @property
     def _alike(self) -> object:

@@ -191,20 +191,20 @@ class Parts:
             self._used[key] = self._kept[key] = found
         return found
 
-    def decision(self, what: str, of: Callable[[], object], make: Callable[[], Made]) -> Made:
+    def decision(self, what: str, of: object, make: Callable[[], Made]) -> Made:
         """Decide about accuracy; of drafts, several share a decision.
 
         An older decision makes a plan less accurate, or slower, than it could be.
 
         Args:
             what: is decided.
-            of: returns what cameras must have in common to share it.
+            of: what cameras must have in common to share it.
             make: decides.
         """
         self.check()
         if self.draft is None:
             return make()
-        key = what, content(of())
+        key = what, content(of)
         if key not in self._decided:
             self._decided[key] = make()
         found: Made = self._decided[key]

@@ -295,7 +295,7 @@ class ByFootprints:
         absorbing = self.absorbing
         return self.parts.decision(
             "cells",
-            lambda: self._alike,
+            self._alike,
             lambda: divide_views(
                 absorbing.at_views,
                 absorbing.in_path,
@@ -325,7 +325,7 @@ class ByFootprints:
         in_path, refine = self.absorbing.in_path, self.how.refine
         return self.parts.decision(
             "samples",
-            lambda: self._alike,
+            self._alike,
             lambda: divide_samples(in_path, self.geometry, self.choose_cells, refine, least=self._least_error),
         )
 
@@ -450,7 +450,7 @@ class ByFootprints:
             return None
         across = self.core.step[[0, 1], [1, 0]].any()
         return self.parts.decision(
-            "sharpening", lambda: (self._alike, across), lambda: Sharpened.choose(self.core, self.grid.sample)
+            "sharpening", (self._alike, across), lambda: Sharpened.choose(self.core, self.grid.sample)
         )
 
     @property
