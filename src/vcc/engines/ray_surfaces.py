@@ -93,7 +93,7 @@ def share_of(a, f, square, arriving, leaving):  # type: ignore[no-untyped-def]
 
 @ray_inlined
 def met_by(a, f, x, y, s, t):  # type: ignore[no-untyped-def]
-    """Where a ray meets the surface, and its refraction there.
+    """Where a ray meets the surface, with the normal and the cosines there.
 
     Returns:
         (far, l, m, n) of `met_at`; the point; (r², 2·∂z/∂r², root of the conic); the normal; the cosines of the
