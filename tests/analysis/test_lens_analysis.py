@@ -71,6 +71,20 @@ def test_spots_are_the_rays_that_pass(gauss: vcc.Camera) -> None:
     assert found.at.fields.heights[1] == pytest.approx(0.6 * math.hypot(12, 18) * mm)
 
 
+def test_spots_of_single_wavelengths() -> None:
+    """The variance of all light is the mean of the wavelengths' variances, and that of their centroids."""
+    lens = vcc.load_lens("double-gauss-50mm", model="real")
+    found = analysis.spots(lens, angles=[10 * deg], wavelengths=[480 * nm, 650 * nm], side=24)
+    ((one, other),) = found.bundles
+    apart = ((one.centroid - other.centroid) ** 2).sum() / 4
+    assert apart > 1e-3 * found.rms[0] ** 2
+    assert found.rms_by_wavelength.shape == (1, 2)
+    assert found.rms[0] ** 2 == pytest.approx((found.rms_by_wavelength**2).mean() + apart, rel=1e-9)
+    assert found.rms_by_wavelength[0, 1] == pytest.approx(
+        math.sqrt(other.light @ ((other.places - other.centroid) ** 2).sum(axis=1) / other.light.sum())
+    )
+
+
 def test_there_and_back(gauss: vcc.Camera) -> None:
     rays = np.random.default_rng(0).uniform(-1, 1, (200, 4)) * [9 * mm, 9 * mm, 0.1, 0.1]
     ends, light = to_sensor(gauss, rays)

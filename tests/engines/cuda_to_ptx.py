@@ -62,8 +62,8 @@ def main() -> None:
     instead = {
         "check_gpu": lambda: None,
         "this_gpu": lambda: 0,
-        "sent": lambda array, stream=0: np.ascontiguousarray(array),
-        "sent_all": lambda given: given,
+        "to_device": lambda array, stream=0: np.ascontiguousarray(array),
+        "to_device_all": lambda given: given,
         "zeros": lambda shape, stream=0: np.zeros(shape, np.float32),
         "brought": lambda array, stream=0: array,
         "is_on_gpu": lambda values: True,
@@ -74,6 +74,7 @@ def main() -> None:
         "launch": compiled,
     }
     for name, function in instead.items():
+        assert hasattr(cuda_arrays, name), name
         setattr(cuda_arrays, name, function)
     from tests.engines.test_agreement import LENS, field, samples, turned
     from vcc.engines import cuda as engine

@@ -35,7 +35,7 @@ from vcc.plan.rays.bounds.cell_windows import Seen
 from vcc.plan.rays.bounds.slopes import Bound
 from vcc.plan.rays.bounds.windows import CellOpening, CellWindows, Sight, Stop, Window
 from vcc.plan.rays.points import columns_of, table
-from vcc.plan.rays.textures import Enough, Sampled, made_fine_enough, means_around
+from vcc.plan.rays.textures import Enough, Region, Sampled, made_fine_enough, means_around
 from vcc.shapes import kernels
 from vcc.shapes.lattice import Lattice
 from vcc.shapes.patterns import Circle, as_pattern
@@ -322,7 +322,7 @@ def sampled(function, low=(-1.0, -2.0), high=(1.0, 2.0)):
         return np.broadcast_arrays(function(x, y), x + y)[0][..., None]
 
     infinite = np.full(2, np.inf)
-    return Sampled(values, (0.25, -0.5), (np.array(low), np.array(high)), (-infinite, infinite), None)
+    return Sampled(values, Region((0.25, -0.5), (np.array(low), np.array(high)), (-infinite, infinite)), None)
 
 
 @pytest.mark.parametrize(("excess", "points"), [(0.9, 5), (2.0, 9), (3.1, 9), (3.4, 17), (400.0, 17)])
@@ -357,12 +357,11 @@ def test_textures_may_be_coarse_where_nobody_would_see_it():
 
 
 def test_a_region_with_room_stays_within_what_passes():
-    region = np.array([-1.0, -2.0]), np.array([1.0, 2.0])
+    ends = np.array([-1.0, -2.0]), np.array([1.0, 2.0])
     passes = np.array([-1.1, -9.0]), np.array([9.0, 2.1])
-    roomy = replace(sampled(lambda x, y: x), region=region, passes=passes).with_room()
-    np.testing.assert_allclose(roomy.region, ([-1.1, -2.4], [1.2, 2.1]))
-    inside = replace(sampled(lambda x, y: x), region=region, passes=(region[0] / 2, region[1] / 2)).with_room()
-    np.testing.assert_allclose(inside.region, region)
+    np.testing.assert_allclose(Region((0.25, -0.5), ends, passes).with_room().ends, ([-1.1, -2.4], [1.2, 2.1]))
+    inside = Region((0.25, -0.5), ends, (ends[0] / 2, ends[1] / 2)).with_room()
+    np.testing.assert_allclose(inside.ends, ends)
 
 
 def test_means_around_points_without_a_closed_form():

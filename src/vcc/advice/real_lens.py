@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.units import short
-from vcc.optics.ray_table import TRACED
+from vcc.optics.real_lens import TracedLens
 from vcc.optics.real_rays import (
     Bundle,
     bands_of,
@@ -38,7 +38,7 @@ def lens_section(train: Train, wavelengths: Sequence[float] | None) -> str:
         train: the camera.
         wavelengths: of the light field's bands, metres; None if they are unknown.
     """
-    if not any(isinstance(element, TRACED) for element in train.elements):
+    if not any(isinstance(element, TracedLens) for element in train.elements):
         return ""
     if train.depends_on_bands and wavelengths is not None and len(wavelengths) > 3:
         wavelengths = [wavelengths[0], wavelengths[len(wavelengths) // 2], wavelengths[-1]]

@@ -215,13 +215,12 @@ def finite(name: str, value: object, of: str = "") -> float:
     return number
 
 
-def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") -> float:
-    """Check a number other than 0, which may be infinite, and return it as a float: a focal length, a radius.
+def not_zero(name: str, value: object, *, way_out: str = "") -> float:
+    """Check a length other than 0, which may be infinite, and return it as a float: a focal length, a radius.
 
     Args:
         name: of the argument in an error.
         value: the number.
-        unit: of the number, for the error.
         way_out: a solution, for the error.
 
     Raises:
@@ -229,12 +228,10 @@ def not_zero(name: str, value: object, *, unit: str = "m", way_out: str = "") ->
     """
     number = _number(name, value)
     if math.isnan(number) and not isinstance(value, float | np.floating):
-        of = "metres" if unit == "m" else unit
-        raise InputError(f"{name} is a number of {of}, not {_shortened(value)}{_and(instead(value), way_out)}")
+        raise InputError(f"{name} is a number of metres, not {_shortened(value)}{_and(instead(value), way_out)}")
     if number == 0 or math.isnan(number):
-        raise InputError(f"{name} is {_shortened(value)} {unit}: it must not be 0{_and(way_out)}")
-    if unit == "m":
-        _check_length(name, number, no_longer=False)
+        raise InputError(f"{name} is {_shortened(value)} m: it must not be 0{_and(way_out)}")
+    _check_length(name, number, no_longer=False)
     return number
 
 

@@ -23,7 +23,7 @@ from vcc.cli.options import (
     length,
     quantity,
 )
-from vcc.cli.sweep import setting
+from vcc.cli.sweep import by_name, setting
 from vcc.dataset import make_dataset
 from vcc.sweeps import Design
 from vcc.sweeps.design import Kind
@@ -97,12 +97,8 @@ class Drawing(Given):
         Raises:
             InputError: a parameter that is given twice; see also `vcc.sweeps.Design`.
         """
-        given = self.set or ()
-        for name, _ in given:
-            if [each for each, _ in given].count(name) > 1:
-                raise InputError(f"--set {name} is given more than once: give all its values in one")
         drawn = self.design in ("random", "sobol")
-        return Design(dict(given), self.design, self.cameras, self.seed if drawn else 0, folder)
+        return Design(by_name(self.set or ()), self.design, self.cameras, self.seed if drawn else 0, folder)
 
 
 @Parameter(name="*", group=TRUTH)

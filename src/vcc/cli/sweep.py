@@ -34,6 +34,18 @@ from vcc.sweeps.table import ENDINGS
 TOLD = Group("The table", sort_key=1.5)
 
 
+def by_name(settings: tuple[tuple[str, str], ...]) -> dict[str, str]:
+    """The values of --set by the name of the parameter.
+
+    Raises:
+        InputError: a parameter is given twice.
+    """
+    for name, _ in settings:
+        if [each for each, _ in settings].count(name) > 1:
+            raise InputError(f"--set {name} is given more than once: give all its values in one")
+    return dict(settings)
+
+
 def setting(text: str, option: str) -> tuple[str, str]:
     """The name of a parameter and its values, from NAME=VALUES."""
     name, equals, values = text.partition("=")
@@ -133,9 +145,7 @@ def sweep(
         table: Also write the table here, .csv or .parquet.
         sheet: Draw the images side by side, .png, .svg or .pdf.
     """
-    for name, _ in set:
-        if [each for each, _ in set].count(name) > 1:
-            raise InputError(f"--set {name} is given more than once: give all its values in one")
+    settings = by_name(set)
     output = check_output(output, (".zarr", *ENDINGS)) if output.suffix != ".zarr" else output.expanduser()
     stored = output.suffix.lower() == ".zarr"
     table = None if table is None else check_output(table, ENDINGS)
@@ -144,7 +154,7 @@ def sweep(
         raise InputError("--sheet shows images, and a table alone keeps none: let --output end in .zarr")
     executing.check_name()
     optics = load_camera(camera)
-    asked = Design(dict(set), design, count, seed, camera.parent)
+    asked = Design(settings, design, count, seed, camera.parent)
     asked.of(optics)  # checked before the light field is read
     field, metrics = reading.light_field(light_field), told.metrics
     executing.check_portable(field, light_field)

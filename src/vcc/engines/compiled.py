@@ -222,3 +222,20 @@ def _say_once(folder: str, error: OSError) -> None:
         CacheWarning,
         stacklevel=2,
     )
+
+
+# --- the decorators of this package's loops: those of rays make no arrays ---
+
+_ORDERED = {"contract", "nsz"}
+_FAST = {*_ORDERED, "reassoc"}
+"""Sums may be reordered, so that they vectorise; NaN and infinity keep their meaning."""
+
+ordered_loop = compiled(fastmath=_ORDERED)
+fast_loop = compiled(fastmath=_FAST)
+fast_inlined = compiled(fastmath=_FAST, inline="always")
+ray_loop = compiled(borrowing=True, fastmath=_ORDERED)
+ray_inlined = compiled(borrowing=True, fastmath=_ORDERED, inline="always")
+ray_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath=_ORDERED)
+"""Called by compiled code only: no wrapper for Python is compiled."""
+ray_back = compiled(borrowing=True, fastmath=_FAST)
+ray_back_inlined = compiled(borrowing=True, fastmath=_FAST, inline="always")

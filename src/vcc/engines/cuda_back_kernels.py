@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.engines.cuda_arrays import cuda, float32, float64
-from vcc.engines.cuda_footprint_kernels import around, mask_at, passed
-from vcc.engines.numba_kernels import farthest, share_at
+from vcc.engines.cuda_footprint_kernels import mask_at, passed
+from vcc.engines.numba_kernels import around, farthest, share_at
 
 
 class Readers(NamedTuple):

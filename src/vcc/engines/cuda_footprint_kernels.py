@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vcc.engines.cuda_arrays import cuda, float32, int32, uint32
 from vcc.engines.interpolation import dark_outside, three_around
-from vcc.engines.numba_kernels import farthest, share_at
+from vcc.engines.numba_kernels import around, farthest, share_at
 
 ROWS = 4
 """Number of raster rows that a thread sums together."""
@@ -353,12 +353,6 @@ def gather(channels: int) -> Any:
                     raster[y, x, c] += scale * total[c]
 
     return kernel
-
-
-@cuda.jit(device=True)
-def around(middle, reach, count):  # type: ignore[no-untyped-def]
-    """(first, after the last) of the numbers 0 … count − 1 that are at most ``reach`` from a place."""
-    return max(np.int64(math.ceil(middle - reach)), 0), min(np.int64(math.floor(middle + reach)) + 1, count)
 
 
 @cuda.jit(device=True)

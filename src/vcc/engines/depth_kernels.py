@@ -12,10 +12,8 @@ import math
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ordered_loop
 from vcc.engines.interpolation import around, bilinear
-
-_compiled = compiled(fastmath={"contract", "nsz"})
 
 TILE = 8
 """Side, in pixels, of the squares whose ranges of disparities bound the marches."""
@@ -29,7 +27,7 @@ HALVINGS = 6
 """Number of bisections of a step of at most a pixel, to find the two pixels around a tear."""
 
 
-@_compiled
+@ordered_loop
 def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
     """A map between its pixels: linear, or the nearest pixel's value at a tear; clamped to the border."""
     c, d, fx = around(x, nearness.shape[1])
@@ -43,7 +41,7 @@ def _surface(nearness, x, y, tear):  # type: ignore[no-untyped-def]
     return bilinear(p00, p01, p10, p11, fx, fy)
 
 
-@_compiled
+@ordered_loop
 def _taps(f):  # type: ignore[no-untyped-def]
     """Weights of samples −1, 0, 1 and 2 for the place f between 0 and 1 (Keys 1981, a = −½), float32."""
     half, one, two = np.float32(0.5), np.float32(1), np.float32(2)
@@ -57,7 +55,7 @@ def _taps(f):  # type: ignore[no-untyped-def]
     )
 
 
-@_compiled
+@ordered_loop
 def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
     """Add a view's value between its pixels, by cubic interpolation; clamped to the border."""
     rows, columns, channels = view.shape
@@ -86,7 +84,7 @@ def _add_colour(view, x, y, weight, out):  # type: ignore[no-untyped-def]
         out[channel] += weight * total
 
 
-@_compiled
+@ordered_loop
 def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type: ignore[no-untyped-def]
     """As `_add_colour` close to other surfaces: pixels nearer than ``nearer`` are left out."""
     rows, columns, channels = view.shape
@@ -119,14 +117,14 @@ def _add_colour_beside_tear(view, nearness, x, y, nearer, weight, out):  # type:
                 out[channel] += share * view[row_taken, column_taken, channel]
 
 
-@_compiled
+@ordered_loop
 def _beyond(nearness, march, k, l, w):  # type: ignore[no-untyped-def]
     """How much nearer than w the map is at the place that a march from (k, l) has reached at w."""
     x, y = _place(march.way, k, l, w)
     return _surface(nearness, x, y, march.tear) - w
 
 
-@_compiled
+@ordered_loop
 def _place(way, k, l, w):  # type: ignore[no-untyped-def]
     """The place in a view of a point at (k, l) with nearness w; way: `Way`."""
     n0, n1, m0, m1 = way.along_v
@@ -134,7 +132,7 @@ def _place(way, k, l, w):  # type: ignore[no-untyped-def]
     return k + d * way.columns, l + (n0 + n1 * d) / (m0 + m1 * d) * way.rows
 
 
-@_compiled
+@ordered_loop
 def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
     """(whether a surface is met, nearness reached by the march, nearness of the surface, nearness beyond a tear).
 
@@ -174,7 +172,7 @@ def _march(nearness, march, k, l, low, high):  # type: ignore[no-untyped-def]
     return False, w0, w0 + f0, w1 + f1
 
 
-@_compiled
+@ordered_loop
 def look_from_between(view, bounds, march, weight, torn_only, found):  # type: ignore[no-untyped-def]
     """Rows of the image from a place between views, rendered from one view.
 
@@ -214,7 +212,7 @@ def look_from_between(view, bounds, march, weight, torn_only, found):  # type: i
                 _add_colour_beside_tear(samples, nearness, x, y, nearer, np.float32(weight), out[row, k])
 
 
-@_compiled
+@ordered_loop
 def tile_ranges(nearness):  # type: ignore[no-untyped-def]
     """(tiles down, tiles across, 2): the lowest and highest nearness in each tile and one pixel around it."""
     rows, columns = nearness.shape
@@ -231,7 +229,7 @@ def tile_ranges(nearness):  # type: ignore[no-untyped-def]
     return ranges
 
 
-@_compiled
+@ordered_loop
 def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
     """The lowest and highest nearness that marches from the pixels of each tile may meet, like ``ranges``."""
     down, across, _ = ranges.shape
@@ -253,7 +251,7 @@ def march_bounds(ranges, way):  # type: ignore[no-untyped-def]
     return bounds
 
 
-@_compiled
+@ordered_loop
 def share_out(out, seen):  # type: ignore[no-untyped-def]
     """Divide sums over several views by their weights; return the number of pixels that no view shows."""
     unseen = 0

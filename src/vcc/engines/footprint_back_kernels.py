@@ -8,22 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_inlined, fast_loop
 from vcc.engines.footprint_tables import EntryMasks
 from vcc.engines.interpolation import dark_outside
-from vcc.engines.numba_kernels import farthest, masks_at, share_at
+from vcc.engines.numba_kernels import add_along_row, around, farthest, masks_at, place_on_mask, share_at
 from vcc.engines.vector_sums import EIGHT, mix_eight
-
-# Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
-_FAST = {"contract", "reassoc", "nsz"}
-_compiled = compiled(fastmath=_FAST)
-_inlined = compiled(fastmath=_FAST, inline="always")
-
 
 # --- separable rows and columns ---
 
 
-@_compiled
+@fast_loop
 def mix_back(tiles, spread, a, channels, band, mixed):  # type: ignore[no-untyped-def]
     """mixed[8i + y, k · channels + c] = Σ share · tiles[i, x · channels + c, y] over the x that sample k falls on.
 
@@ -45,7 +39,7 @@ def mix_back(tiles, spread, a, channels, band, mixed):  # type: ignore[no-untype
                 line[x] = eight[EIGHT * x + y]
 
 
-@_compiled
+@fast_loop
 def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gradient):  # type: ignore[no-untyped-def]
     """Add the gradients of a column of view taps to rows of samples of some views, ``height`` rows at a time.
 
@@ -91,7 +85,7 @@ def add_rows_back(mixed, readers, spread, masks, fine, across, rows, height, gra
                 )
 
 
-@_inlined
+@fast_inlined
 def _not_zero(shares):  # type: ignore[no-untyped-def]
     """(first, after the last) of the nonzero shares; equal if there are none."""
     low, stop = 0, shares.size
@@ -102,7 +96,7 @@ def _not_zero(shares):  # type: ignore[no-untyped-def]
     return low, stop
 
 
-@_inlined
+@fast_inlined
 def _add_rows(mixed, first, low, stop, shares, weight, anew, to):  # type: ignore[no-untyped-def]
     """to += Σ weight · shares[m] · mixed[first + m], three at a time; set to zero first if ``anew``."""
     n = to.size
@@ -124,7 +118,7 @@ def _add_rows(mixed, first, low, stop, shares, weight, anew, to):  # type: ignor
                 to[x] += a * one[x]
 
 
-@_inlined
+@fast_inlined
 def _mask_row(weighed, row):  # type: ignore[no-untyped-def]
     """The product of the masks' weights at a row of samples, from the lines of `masks_at`."""
     lines, places, shares = weighed
@@ -141,7 +135,7 @@ def _mask_row(weighed, row):  # type: ignore[no-untyped-def]
                 row[k] *= a * one[k] + b * two[k] + c * three[k]
 
 
-@_inlined
+@fast_inlined
 def _add_weighed(seen, row, channels, to):  # type: ignore[no-untyped-def]
     """to[k · channels + c] += row[k] · seen[k · channels + c]"""
     if channels == 1:
@@ -162,7 +156,7 @@ def _add_weighed(seen, row, channels, to):  # type: ignore[no-untyped-def]
 # --- subdivided samples ---
 
 
-@_inlined
+@fast_inlined
 def _give_rows(line, first, shares, start, sums):  # type: ignore[no-untyped-def]
     """Add a row of finer samples to the rows of samples, from ``start`` on, that it is made from."""
     for t in range(shares.size):
@@ -173,7 +167,7 @@ def _give_rows(line, first, shares, start, sums):  # type: ignore[no-untyped-def
                 to[x] += share * line[x]
 
 
-@_inlined
+@fast_inlined
 def _give_columns(sums, across, channels, begin, gradient):  # type: ignore[no-untyped-def]
     """gradient[begin + …] += rows of finer samples, each summed into the columns of samples that it is made from.
 
@@ -182,32 +176,13 @@ def _give_columns(sums, across, channels, begin, gradient):  # type: ignore[no-u
     """
     first, shares = across
     for line in range(len(sums)):
-        source, start = sums[line], begin + line * first.size * channels
-        for k in range(first.size):
-            at = np.uint64(first[k] * channels)
-            if channels == 3:
-                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-                for t in range(shares.shape[1]):
-                    share = shares[k, t]
-                    red += share * source[at]
-                    green += share * source[at + np.uint64(1)]
-                    blue += share * source[at + np.uint64(2)]
-                    at += np.uint64(3)
-                gradient[start + 3 * k] += red
-                gradient[start + 3 * k + 1] += green
-                gradient[start + 3 * k + 2] += blue
-            else:
-                for c in range(channels):
-                    total = np.float32(0)
-                    for t in range(shares.shape[1]):
-                        total += shares[k, t] * source[at + np.uint64(t * channels + c)]
-                    gradient[start + k * channels + c] += total
+        add_along_row(sums[line], first, shares, channels, begin + line * first.size * channels, gradient)
 
 
 # --- sheared rows and columns ---
 
 
-@_compiled
+@fast_loop
 def mix_sheared_back(raster, view, grid, footprint, columns, band, mixed):  # type: ignore[no-untyped-def]
     """mixed[y, k, c] = Σ share · raster[y, x, c] over the x that column k of a view's samples falls on in row y.
 
@@ -221,15 +196,14 @@ def mix_sheared_back(raster, view, grid, footprint, columns, band, mixed):  # ty
             x = view.x + grid.shear * (y - view.y) + grid.column_step * (grid.first_k + n / grid.refine)
             for c in range(raster.shape[2]):
                 mixed[y, n, c] = 0
-            low = max(int(np.ceil(x - reach)), 0)
-            high = min(int(np.floor(x + reach)), raster.shape[1] - 1)
-            for pixel in range(low, high + 1):
+            low, high = around(x, reach, raster.shape[1])
+            for pixel in range(low, high):
                 share = share_at(footprint, pixel - x, width)
                 for c in range(raster.shape[2]):
                     mixed[y, n, c] += share * raster[y, pixel, c]
 
 
-@_compiled
+@fast_loop
 def add_sheared_back(mixed, view, grid, footprint, masks, fine, across, rows, gradient):  # type: ignore[no-untyped-def]
     """Add the gradients of a view tap to some rows of samples, if rows and columns of samples are sheared.
 
@@ -255,7 +229,7 @@ def add_sheared_back(mixed, view, grid, footprint, masks, fine, across, rows, gr
         _give_columns(sums, across, channels, rows.start * across.first.size * channels, gradient)
 
 
-@_inlined
+@fast_inlined
 def _sheared_row(mixed, view, grid, footprint, masks, m, line):  # type: ignore[no-untyped-def]
     """line[k, c] = gradient of sample k of row m of a view tap; arguments as for `add_sheared_back`."""
     _, weight, _, y0, place = view
@@ -268,17 +242,15 @@ def _sheared_row(mixed, view, grid, footprint, masks, m, line):  # type: ignore[
     for n in range(line.shape[0]):
         k = grid.first_k + n / grid.refine
         y = y0 + grid.step[1, 0] * k + grid.row_step * grid.first_l + row_step * m
-        low = max(int(np.ceil(y - reach)), 0)
-        high = min(int(np.floor(y + reach)), mixed.shape[0] - 1)
-        through = weight if low <= high else 0.0
+        low, high = around(y, reach, mixed.shape[0])
+        through = weight if low < high else 0.0
         for mask in range(place.shape[0]):
             if through != 0:
-                column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                row, column = place_on_mask(place, mask_step, mask, k, l)
                 texture = textures[mask, : size[mask, 0], : size[mask, 1]]
                 through *= dark_outside(texture, row, column)
         if through != 0:
-            for pixel in range(low, high + 1):
+            for pixel in range(low, high):
                 share = through * share_at(footprint, pixel - y, height)
                 for c in range(line.shape[1]):
                     line[n, c] += share * mixed[pixel, n, c]

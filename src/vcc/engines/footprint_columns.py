@@ -15,7 +15,7 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_tables as tables
 from vcc.engines import numba_kernels as kernels
 from vcc.engines.footprint_samples import FineGrid, MaskColumns, blocks, taps_along
-from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST
+from vcc.engines.vector_sums import EIGHT, ROWS, SHORTEST, aligned_buffer
 from vcc.plan.footprints.model import Footprints
 
 BAND = 64
@@ -34,6 +34,15 @@ def bands(rows: int, height: int = BAND) -> list[tables.Band]:
 def band_height(line: int) -> int:
     """Rows of the image in a band, if one row of sums has ``line`` bytes: a multiple of eight."""
     return int(np.clip(BAND_BYTES // line, EIGHT, BAND)) // EIGHT * EIGHT
+
+
+def in_tiles(raster: NDArray[np.floating], beyond: int, pool: Workers) -> NDArray[np.float32]:
+    """A raster (rows, columns, channels) as tiles (rows / 8, values, 8), with columns of zeros beyond its last."""
+    lines = np.ascontiguousarray(raster, dtype=np.float32).reshape(len(raster), -1)
+    tiles = aligned_buffer(-(-len(lines) // EIGHT), lines.shape[1] + beyond * raster.shape[2], EIGHT)
+    tiles[:] = 0
+    list(pool.map(lambda tile: kernels.turned(lines, tile, tiles), range(len(tiles))))
+    return tiles
 
 
 class ByColumns:

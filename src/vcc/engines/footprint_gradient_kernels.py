@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_inlined, fast_loop
 from vcc.engines.footprint_tables import EntryMasks
 from vcc.engines.interpolation import slopes_around
-from vcc.engines.numba_kernels import columns_around, divide, farthest, masks_at, share_at
+from vcc.engines.numba_kernels import around, columns_around, divide, farthest, masks_at, place_on_mask, share_at
 from vcc.engines.vector_rows import (
     first_four_rows,
     four_dots,
@@ -33,28 +33,15 @@ DIVIDED = 32
 AHEAD = 2
 """Rows of samples between the row being read and the row being prefetched."""
 
-_FAST = {"contract", "reassoc", "nsz"}
-_compiled = compiled(fastmath=_FAST)
-_inlined = compiled(fastmath=_FAST, inline="always")
 
-
-@_compiled
-def turned(raster, tile, tiles):  # type: ignore[no-untyped-def]
-    """tiles[tile, x, y] = raster[8 · tile + y, x]: eight rows transposed, zero beyond the last."""
-    start = EIGHT * tile
-    for y in range(min(EIGHT, raster.shape[0] - start)):
-        for x in range(raster.shape[1]):
-            tiles[tile, x, y] = raster[start + y, x]
-
-
-@_compiled
+@fast_loop
 def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
     """mixed[s, y, (k − start) · channels + c] = Σ share · raster[y, x · channels + c] over x that sample k
     reaches.
 
-    tiles: the raster, from `turned`. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows, values); a
-    multiple of eight rows, and more. It is zero in columns of samples that an earlier span has or that do not
-    exist, and in the further rows.
+    tiles: the raster, from `footprint_columns.in_tiles`. gathered: `Gathered`. span: `Span`. mixed: (kinds, rows,
+    values); a multiple of eight rows, and more. It is zero in columns of samples that an earlier span has or that
+    do not exist, and in the further rows.
     """
     first, shares = gathered
     step = np.int64(EIGHT * channels)
@@ -75,7 +62,7 @@ def mix(tiles, gathered, span, channels, mixed):  # type: ignore[no-untyped-def]
                         out[y, (k - span.start) * channels + c] = eight[y]
 
 
-@_compiled
+@fast_loop
 def add_gradients(samples, a, used, fine, tables, masks, sought, channels, span, totals):  # type: ignore[no-untyped-def]
     """Add the gradients from the samples in a span of columns, for a column of view taps.
 
@@ -112,7 +99,7 @@ def add_gradients(samples, a, used, fine, tables, masks, sought, channels, span,
                              weights[b], masks, sought, channels, span, totals)  # fmt: skip
 
 
-@_compiled
+@fast_loop
 def add_rows(  # type: ignore[no-untyped-def]
     values, start, pitch, b, low, high, mixed, reached, pairs, weight, masks, sought, channels, span, totals
 ):
@@ -179,7 +166,7 @@ def add_rows(  # type: ignore[no-untyped-def]
                 totals[b, total_of[pair]] += total
 
 
-@_inlined
+@fast_inlined
 def _through(lines, line, share, mask, start, n, out):  # type: ignore[no-untyped-def]
     """out[mask · n + k]: the weights of a mask along a row of samples."""
     first, second, third = _places(line, mask, start)
@@ -189,7 +176,7 @@ def _through(lines, line, share, mask, start, n, out):  # type: ignore[no-untype
         out[to + k] = above * lines[first + k] + level * lines[second + k] + below * lines[third + k]
 
 
-@_inlined
+@fast_inlined
 def _places(line, mask, start):  # type: ignore[no-untyped-def]
     """Where a span begins in three lines of a mask."""
     return (
@@ -199,7 +186,7 @@ def _places(line, mask, start):  # type: ignore[no-untyped-def]
     )
 
 
-@_inlined
+@fast_inlined
 def _steep(place, share, mask):  # type: ignore[no-untyped-def]
     """Derivatives of the weights of three lines of a mask to the place in the mask."""
     zero = np.float32(0)
@@ -211,7 +198,7 @@ def _steep(place, share, mask):  # type: ignore[no-untyped-def]
     )
 
 
-@_inlined
+@fast_inlined
 def _seen(planes, y, wide, plain, first, rows, values, at, channels, out):  # type: ignore[no-untyped-def]
     """out[k] = Σ values[at + x] · Σ plain[first + t] · planes[y + t · wide + x] over the channels x of sample k.
 
@@ -242,7 +229,7 @@ def _seen(planes, y, wide, plain, first, rows, values, at, channels, out):  # ty
             out[k] = total
 
 
-@_inlined
+@fast_inlined
 def _without(seen, through, mask, count, n, out):  # type: ignore[no-untyped-def]
     """out[k] = seen[k] times the weights of all masks but one."""
     for k in range(np.uint64(n)):
@@ -254,7 +241,7 @@ def _without(seen, through, mask, count, n, out):  # type: ignore[no-untyped-def
                 out[k] *= through[at + k]
 
 
-@_inlined
+@fast_inlined
 def _lit(through, count, n, out):  # type: ignore[no-untyped-def]
     """out[k]: the product of the weights of all masks; unchanged if there are none."""
     for mask in range(count):
@@ -267,7 +254,7 @@ def _lit(through, count, n, out):  # type: ignore[no-untyped-def]
                 out[k] *= through[at + k]
 
 
-@_inlined
+@fast_inlined
 def _weighed(values, at, lit, channels, n, out):  # type: ignore[no-untyped-def]
     """out[k · channels + c] = a sample's value times the weights of all masks."""
     if channels == 1:
@@ -280,7 +267,7 @@ def _weighed(values, at, lit, channels, n, out):  # type: ignore[no-untyped-def]
                 out[k * channels + c] = lit[k] * np.float32(values[at + k * channels + c])
 
 
-@_inlined
+@fast_inlined
 def _to_lines(seen, weight, line, share, mask, start, n, lines):  # type: ignore[no-untyped-def]
     """Add the gradients of a row of samples to the three lines of a mask around it."""
     parts = (
@@ -292,7 +279,7 @@ def _to_lines(seen, weight, line, share, mask, start, n, lines):  # type: ignore
     to_three_rows(seen, parts, (np.int64(first), np.int64(second), np.int64(third)), n, lines)
 
 
-@_inlined
+@fast_inlined
 def _to_places(  # type: ignore[no-untyped-def]
     seen, lines, slopes, line, share, steep, b, mask, first_k, n, indices, row, places
 ):
@@ -318,7 +305,7 @@ def _to_places(  # type: ignore[no-untyped-def]
     places[b, mask, 5] += np.float64(down) * row
 
 
-@_compiled
+@fast_loop
 def slopes_at_columns(texture, column, out):  # type: ignore[no-untyped-def]
     """out[r, k]: slope of texture[r] at column[k], as interpolated by `numba_kernels.sample_mask_columns`."""
     points, counts = columns_around(column, texture.shape[1])
@@ -333,7 +320,7 @@ def slopes_at_columns(texture, column, out):  # type: ignore[no-untyped-def]
             to[k] = before[k] * line[left[k]] + at[k] * line[here[k]] + after[k] * line[right[k]]
 
 
-@_compiled
+@fast_loop
 def give_back_columns(lines, column, texture):  # type: ignore[no-untyped-def]
     """The transpose of `numba_kernels.sample_mask_columns`, added to a texture, float64."""
     points, counts = columns_around(column, texture.shape[1])
@@ -354,7 +341,7 @@ SHEARED = 10
 """Number of sums per tap: see `add_sheared`."""
 
 
-@_compiled
+@fast_loop
 def _height(interpolation, a):  # type: ignore[no-untyped-def]
     """φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 spline, 4 box."""
     r = abs(a)
@@ -369,7 +356,7 @@ def _height(interpolation, a):  # type: ignore[no-untyped-def]
     return ((-0.5 * r + 2.5) * r - 4) * r + 2 if r < 2 else 0.0
 
 
-@_compiled
+@fast_loop
 def _slopes(footprint, offset, size):  # type: ignore[no-untyped-def]
     """A share, and its derivatives to the sample's place, the size and the opening (`shares.share_slopes`)."""
     interpolation, _, opening = footprint
@@ -387,7 +374,7 @@ def _slopes(footprint, offset, size):  # type: ignore[no-untyped-def]
     )
 
 
-@_compiled
+@fast_loop
 def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradient):  # type: ignore[no-untyped-def]
     """Add the gradients of one view from a band of raster rows, if rows and columns of samples are sheared.
 
@@ -422,15 +409,13 @@ def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradie
             k = first_k + n / refine
             y_start = y0 + step[1, 0] * k + coarse_row_step * first_l
             middle = (y - y_start) / row_step
-            first = max(int(np.ceil(middle - reach_y / height)), 0)
-            last = min(int(np.floor(middle + reach_y / height)), nt - 1)
+            first, stop = around(middle, reach_y / height, nt)
             x = x0 + shear * (y - y0) + coarse_column_step * k
-            left = max(int(np.ceil(x - reach_x)), 0)
-            right = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
-            if first > last or left > right:
+            left, right = around(x, reach_x, raster.shape[1])
+            if first >= stop or left >= right:
                 continue
             mixed[:] = 0
-            for pixel in range(left, right + 1):
+            for pixel in range(left, right):
                 share, to_x, to_width, to_opening_x = _slopes(footprint, pixel - x, width)
                 for c in range(channels):
                     weigh = raster[y, pixel, c]
@@ -438,13 +423,12 @@ def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradie
                     mixed[1, c] += to_x * weigh
                     mixed[2, c] += to_width * weigh
                     mixed[3, c] += to_opening_x * weigh
-            for m in range(first, last + 1):
+            for m in range(first, stop):
                 l = first_l + m / refine
                 share, to_y, to_height, to_opening = _slopes(footprint, y - y_start - row_step * m, height)
                 light = 1.0
                 for mask in range(count):
-                    column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                    row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                    row, column = place_on_mask(place, mask_step, mask, k, l)
                     values[mask], along[mask], down[mask] = _looked_up(
                         textures, mask, size[mask, 0], size[mask, 1], row, column
                     )
@@ -478,12 +462,11 @@ def add_sheared(view, grid, footprint, masks, raster, band, sums, places, gradie
                     places[mask, 4] += rest * down[mask] * k
                     places[mask, 5] += rest * down[mask] * l
                     if gradient.size > 0 and rest != 0:
-                        column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                        row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                        row, column = place_on_mask(place, mask_step, mask, k, l)
                         _given_back(gradient, mask, size[mask, 0], size[mask, 1], row, column, weight * rest)
 
 
-@_compiled
+@fast_loop
 def _three(place):  # type: ignore[no-untyped-def]
     """As `three_around`, with the derivatives of the weights to the place, in double precision."""
     middle = int(np.floor(place + 0.5))
@@ -492,7 +475,7 @@ def _three(place):  # type: ignore[no-untyped-def]
     return middle, shares, (off - 0.5, -2 * off, off + 0.5)
 
 
-@_inlined
+@fast_inlined
 def _looked_up(textures, mask, rows, columns, row, column):  # type: ignore[no-untyped-def]
     """A mask's value at a place, and its slopes along columns and along rows; zero around the mask."""
     value, along, down = 0.0, 0.0, 0.0
@@ -509,7 +492,7 @@ def _looked_up(textures, mask, rows, columns, row, column):  # type: ignore[no-u
     return value, along, down
 
 
-@_inlined
+@fast_inlined
 def _given_back(gradient, mask, rows, columns, row, column, light):  # type: ignore[no-untyped-def]
     """Add light to the points of a texture around a place; the transpose of `_looked_up`."""
     if -1.5 < row < rows + 0.5 and -1.5 < column < columns + 0.5:

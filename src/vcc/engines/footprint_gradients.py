@@ -30,6 +30,7 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_gradient_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import axes
+from vcc.engines.footprint_columns import in_tiles
 from vcc.engines.footprint_samples import (
     FineGrid,
     MaskColumns,
@@ -111,7 +112,7 @@ def footprint_gradients(
     masks = _of_masks(core, wanted)
     with Workers(threads) as pool:
         if core.separable:
-            back = _ByColumns(core, weights, raster.reshape(len(raster), -1), channels, wanted, pool)
+            back = _ByColumns(core, weights, raster, channels, wanted, pool)
             sums = back.sums_over(values, progress)
         else:
             sums = _sheared(core, weights, values, np.asarray(raster, dtype=np.float64), masks[0], pool, progress)
@@ -179,7 +180,7 @@ class _ByColumns:
         self.first, _, gathered = along_x.table(across)
         self.gathered = np.ascontiguousarray(np.moveaxis(gathered, 2, 1), dtype=np.float32)
         """(columns of taps, kinds, columns of samples, width)"""
-        self.tiles = self.turned(np.asarray(raster, dtype=np.float32), self.gathered.shape[-1])
+        self.tiles = in_tiles(raster, self.gathered.shape[-1], pool)
         self.masks = MaskColumns(core, fine, 1, 1, pool)
         self.texture, self.place = _of_masks(core, wanted)
         self.textures: list[Array | None] = [
@@ -190,13 +191,6 @@ class _ByColumns:
         # The columns of samples in the spans, one span after the other.
         held = np.concatenate([np.arange(span.start, span.stop) for span in self.spans])
         self.held = np.minimum(held, fine.columns - 1)
-
-    def turned(self, raster: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-        """The raster, transposed in tiles of eight rows, with zeros beyond the last column."""
-        tiles = aligned_buffer(-(-len(raster) // EIGHT), raster.shape[1] + width * self.channels, EIGHT)
-        tiles[:] = 0
-        list(self.pool.map(lambda tile: kernels.turned(raster, tile, tiles), range(len(tiles))))
-        return tiles
 
     def sums_over(self, values: NDArray[Any], progress: Progress | None) -> _Sums:
         """The sums over all samples."""

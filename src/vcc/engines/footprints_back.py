@@ -21,8 +21,9 @@ from vcc.base.workers import Workers
 from vcc.engines import footprint_back_kernels as kernels
 from vcc.engines import footprint_tables as tables
 from vcc.engines.footprint_axes import Axis, axes
+from vcc.engines.footprint_columns import bands, in_tiles
 from vcc.engines.footprint_samples import FineGrid, MaskColumns, no_masks, on_raster, textures, view_of
-from vcc.engines.vector_sums import EIGHT, aligned_buffer
+from vcc.engines.vector_sums import aligned_buffer
 from vcc.plan.footprints.model import Footprints
 from vcc.plan.footprints.shares import Taps
 
@@ -80,8 +81,8 @@ class _Back:
 
     def pieces(self, rows: int, parts: int = 1) -> list[tables.Band]:
         """Divide rows into bands: enough of them for all threads, given the number of parts."""
-        bands = -(-TASKS * self.threads // parts)
-        return _bands(rows, -(-rows // bands))
+        count = -(-TASKS * self.threads // parts)
+        return bands(rows, -(-rows // count))
 
 
 class _ByColumns(_Back):
@@ -91,7 +92,7 @@ class _ByColumns(_Back):
         """Fill the gradient."""
         core, fine = self.core, self.fine
         self.down, self.sideways = (_spread(axis) for axis in axes(core, fine))
-        self.tiles = _eight_side_by_side(self.raster, self.sideways.shares.shape[2])
+        self.tiles = in_tiles(self.raster, self.sideways.shares.shape[2], self.pool)
         self.mixed = aligned_buffer(core.raster_shape[0], self.n)
         self.masks = MaskColumns(core, fine, 1, 1, self.pool)
         self.weights = (core.weights * core.scale).astype(np.float32)
@@ -116,8 +117,8 @@ class _ByColumns(_Back):
 
         # Whole views if there are enough: two threads that write to one new page of memory both clear it.
         parts = self.readers(a)
-        bands = self.pieces(self.core.samples[0], len(parts))
-        list(self.pool.map(add, [(readers, band) for readers in parts for band in bands]))
+        pieces = self.pieces(self.core.samples[0], len(parts))
+        list(self.pool.map(add, [(readers, band) for readers in parts for band in pieces]))
 
     def readers(self, a: int) -> list[tables.Readers]:
         """The taps of a column, sorted by the views that they read, in parts."""
@@ -146,7 +147,7 @@ class _Sheared(_Back):
         masks = textures(core)
         mixed = np.empty((len(self.raster), fine.columns, self.channels), dtype=np.float32)
         lines = self.pieces(len(self.raster))
-        bands = _bands(core.samples[0], min(self.height, -(-core.samples[0] // (TASKS * self.threads))))
+        pieces = bands(core.samples[0], min(self.height, -(-core.samples[0] // (TASKS * self.threads))))
         nothing = np.zeros((1, 1, 1), dtype=np.float32)
         for done, (b, a) in enumerate(zip(*np.nonzero(core.weights), strict=True)):
             tell(progress, done, core.taps_used)
@@ -155,13 +156,8 @@ class _Sheared(_Back):
             list(self.pool.map(lambda band, mix=mix: mix(band, mixed), lines))
             flat = self.gradient[core.view_rows[b], core.view_columns[a]].reshape(-1)
             add = partial(kernels.add_sheared_back, mixed, view, grid, footprint, masks, self.divided, self.across)
-            list(self.pool.map(lambda band, add=add, to=flat: add(band, to), bands))
+            list(self.pool.map(lambda band, add=add, to=flat: add(band, to), pieces))
         tell(progress, core.taps_used, core.taps_used)
-
-
-def _bands(rows: int, height: int) -> list[tables.Band]:
-    """Divide rows into bands of ``height``."""
-    return [tables.Band(start, min(start + height, rows)) for start in range(0, rows, height)]
 
 
 def _spread(axis: Axis) -> tables.Spread:
@@ -180,13 +176,3 @@ def _division(fine: FineGrid, pitch: int) -> tuple[tables.FineSamples, tables.Sp
     across = fine.divided_as[1]
     of_samples = Taps(across.first, across.shares).by_sample(fine.samples[1])
     return fine.tables(pitch), tables.Spread(of_samples.first, of_samples.weights)
-
-
-def _eight_side_by_side(raster: Weights, beyond: int) -> Weights:
-    """A raster (rows, columns, channels) as tiles (rows / 8, values, 8), with columns of zeros beyond its last."""
-    rows, columns, channels = raster.shape
-    tall = np.zeros((-(-rows // EIGHT) * EIGHT, (columns + beyond) * channels), dtype=np.float32)
-    tall[:rows, : columns * channels] = raster.reshape(rows, -1)
-    tiles = aligned_buffer(len(tall) // EIGHT, tall.shape[1], EIGHT)
-    tiles[:] = tall.reshape(-1, EIGHT, tall.shape[1]).swapaxes(1, 2)
-    return tiles

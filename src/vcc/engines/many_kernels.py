@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_inlined, fast_loop
 from vcc.engines.footprint_tables import Entries, EntryMasks
 from vcc.engines.interpolation import three_around
 from vcc.engines.numba_kernels import masks_at, mix_columns, rows_of, sort_by_range
@@ -28,12 +28,8 @@ from vcc.engines.vector_weights import MASKS, weigh_parted_rows, weigh_rows
 SPAN = 576
 """Approximate number of values of rows of samples to sum at a time: with lines of masks they stay in the cache."""
 
-_FAST = {"contract", "reassoc", "nsz"}
-_compiled = compiled(fastmath=_FAST)
-_inlined = compiled(fastmath=_FAST, inline="always")
 
-
-@_compiled
+@fast_loop
 def add_column_of_views(samples, a, footprints, weights, masks, band, tiles):  # type: ignore[no-untyped-def]
     """Add column a of view taps to a band of several rasters, each with its own weights of taps.
 
@@ -76,13 +72,13 @@ def add_column_of_views(samples, a, footprints, weights, masks, band, tiles):  #
             mix_columns(sums[n].reshape(EIGHT, pitch), first_column[a], column_shares[a], channels, turned, tile)
 
 
-@_inlined
+@fast_inlined
 def _span(part, pitch):  # type: ignore[no-untyped-def]
     """(first, after the last) of the values of a row that are summed together; the last span is longer."""
     return part * SPAN, pitch if part + 1 >= pitch // SPAN else (part + 1) * SPAN
 
 
-@_inlined
+@fast_inlined
 def _moved(weighed, entry, values):  # type: ignore[no-untyped-def]
     """Move the lookup of masks along their lines by this number of values."""
     for mask in range(weighed.places.shape[1]):
@@ -90,7 +86,7 @@ def _moved(weighed, entry, values):  # type: ignore[no-untyped-def]
             weighed.places[entry, mask, n] += values
 
 
-@_compiled
+@fast_loop
 def _sum_view(  # type: ignore[no-untyped-def]
     values, begin, pitch, length, b, gathered, masks, low, start, stop, sums, to
 ):
@@ -134,7 +130,7 @@ def _sum_view(  # type: ignore[no-untyped-def]
             sum_masked_whole_rows(values, entries, weighed, sums, to + (y - start) * sums.shape[1], length)
 
 
-@_compiled
+@fast_loop
 def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # type: ignore[no-untyped-def]
     """Add column a of view taps to a band of several rasters, which differ in the texture of a mask.
 
@@ -155,7 +151,7 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
     order, places, ranges = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room, np.int64)
     share, ends = np.empty((room, ROWS), np.float32), np.empty(10, np.int64)
     entries = Entries(order, ends, places, share)
-    reached, line_of, three = np.empty(room, np.int64), np.empty(room, np.int64), np.empty((room, 3), np.float32)
+    line_of, three = np.empty(room, np.int64), np.empty((room, 3), np.float32)
     parts = np.empty((height + ROWS, min(2 * SPAN, pitch) + 3 * LANES), np.float32)
     sums = np.empty((textures, EIGHT * pitch), np.float32)
     flat_parts, flat_sums, flat_lines = parts.reshape(-1), sums.reshape(-1), met.lines.reshape(-1)
@@ -195,7 +191,7 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
                     continue
                 count = high - low + 1
                 for four in range(0, count, ROWS):
-                    _reach(line_of, three, listed, low + four, entries, ranges, reached)
+                    _reach(line_of, three, listed, low + four, entries, ranges)
                     to = four * part
                     if masks is None:
                         if threes:
@@ -220,13 +216,12 @@ def add_column_of_textures(samples, a, footprints, met, masks, band, tiles):  # 
             mix_columns(sums[n].reshape(EIGHT, pitch), first_column[a], column_shares[a], channels, turned, tile)
 
 
-@_inlined
-def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: ignore[no-untyped-def]
+@fast_inlined
+def _reach(line_of, three, listed, low, entries, ranges):  # type: ignore[no-untyped-def]
     """List the rows of samples that reach any of four lines from ``low`` on, sorted by range of lines."""
     order, ends, _, share = entries
-    count = 0
-    ends[:] = 0
     for entry in range(listed):
+        ranges[entry] = -1
         off = line_of[entry] - low
         if off <= -3 or off >= ROWS:
             continue
@@ -238,20 +233,11 @@ def _reach(line_of, three, listed, low, entries, ranges, reached):  # type: igno
                 top, bottom = r if top < 0 else top, r
         if top >= 0:
             # Ranges are numbered 00 01 02 03 11 12 13 22 23 33.
-            ranges[count], reached[count] = top * ROWS - top * (top + 1) // 2 + bottom, entry
-            ends[ranges[count]] += 1
-            count += 1
-    total = 0
-    for n in range(ends.size):
-        here = ends[n]
-        ends[n] = total
-        total += here
-    for n in range(count):
-        order[ends[ranges[n]]] = reached[n]
-        ends[ranges[n]] += 1
+            ranges[entry] = top * ROWS - top * (top + 1) // 2 + bottom
+    sort_by_range(ranges, listed, ends, order)
 
 
-@_compiled
+@fast_loop
 def mix_piece(values, taken, numbers, pictures, rows, columns):  # type: ignore[no-untyped-def]
     """pictures[n, top + y, left + x] = Σ_k numbers[n, taken[k]] · values[k, y · (right − left) + x].
 

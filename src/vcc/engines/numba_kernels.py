@@ -6,9 +6,11 @@ GIL; the threads are Python threads.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_inlined, fast_loop
 from vcc.engines.footprint_tables import Entries, EntryMasks, Lines
 from vcc.engines.interpolation import dark_outside, three_around
 from vcc.engines.vector_sums import (
@@ -26,13 +28,8 @@ from vcc.engines.vector_sums import (
 VIEWS = 8
 """Views summed at once. More would be more concurrent streams of memory than the processor prefetches."""
 
-# Sums may be reordered so that they vectorise; NaN and infinity keep their meaning.
-_FAST = {"contract", "reassoc", "nsz"}
-_compiled = compiled(fastmath=_FAST)
-_inlined = compiled(fastmath=_FAST, inline="always")
 
-
-@_compiled
+@fast_loop
 def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore[no-untyped-def]
     """sums[y − band.start] += the rows of all views of one column that fall on raster row y, times their masks.
 
@@ -102,7 +99,7 @@ def sum_rows(lines, used, weights, gathered, masks, band, sums):  # type: ignore
                     add_masked_rows(samples, entries, weighed, here, x - here, sums, y - start)
 
 
-@_inlined
+@fast_inlined
 def rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # type: ignore[no-untyped-def]
     """List the rows of samples of tap b that fall on four raster rows from y on: returns (first row, count).
 
@@ -129,7 +126,7 @@ def rows_of(b, y, stop, weight, gathered, share, entry, lowest, highest):  # typ
     return top, count
 
 
-@_inlined
+@fast_inlined
 def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     """Look up three lines of each mask around row l of the samples of tap b; False if the row is dark.
 
@@ -154,7 +151,7 @@ def masks_at(masks, b, l, entry, weighed):  # type: ignore[no-untyped-def]
     return True
 
 
-@_inlined
+@fast_inlined
 def sort_by_range(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
     """Sort the entries by range; ``ends`` is the number of entries in each range and all earlier ones."""
     ends[:] = 0
@@ -172,7 +169,7 @@ def sort_by_range(ranges, entries, ends, order):  # type: ignore[no-untyped-def]
             ends[ranges[entry]] += 1
 
 
-@_compiled
+@fast_loop
 def add_columns(samples, columns, footprints, masks, band, tiles):  # type: ignore[no-untyped-def]
     """Add columns of view taps, one after the other, to a band of raster rows.
 
@@ -192,7 +189,7 @@ def add_columns(samples, columns, footprints, masks, band, tiles):  # type: igno
             mix_columns(sums, first_column[a], column_shares[a], channels, turned, tiles[band.start // EIGHT :])
 
 
-@_compiled
+@fast_loop
 def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # type: ignore[no-untyped-def]
     """As `add_columns` for column a, whose samples are subdivided view by view; fine: `FineSamples`.
 
@@ -217,7 +214,7 @@ def add_divided_column(samples, a, footprints, fine, masks, band, tiles):  # typ
     mix_columns(sums, first_column[a], column_shares[a], channels, turned, tiles[band.start // EIGHT :])
 
 
-@_inlined
+@fast_inlined
 def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
     """(first, after the last) row of samples of tap b that falls on a band; first is ``low`` if there is none."""
     # Not a literal 0: Numba would compile functions called with it twice, for literals and for numbers.
@@ -229,7 +226,7 @@ def _rows_needed(gathered, b, band, low):  # type: ignore[no-untyped-def]
     return low, high
 
 
-@_inlined
+@fast_inlined
 def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
     """Buffers: the sums of a band's rows (not zeroed), and eight transposed rows, zero beyond the last sample."""
     rows = band.stop - band.start
@@ -237,7 +234,7 @@ def _room(band, pitch, width, channels):  # type: ignore[no-untyped-def]
     return sums, np.zeros(((pitch + width * channels) * EIGHT), np.float32)
 
 
-@_compiled
+@fast_loop
 def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped-def]
     """divided[l − low] = row l of a view's finer samples, for low ≤ l < high; begin: where the view begins."""
     values, _, _, pitch, channels = samples
@@ -251,27 +248,35 @@ def divide(samples, begin, fine, low, high, divided):  # type: ignore[no-untyped
                 line, share = values[start : start + pitch], row_shares[l, t]
                 for x in range(pitch):
                     source[x] += share * np.float32(line[x])
-        out = divided[l - low]
-        for k in range(first_column.size):
-            at = np.uint64(first_column[k] * channels)
-            if channels == 3:
-                red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-                for t in range(column_shares.shape[1]):
-                    share = column_shares[k, t]
-                    red += share * source[at]
-                    green += share * source[at + np.uint64(1)]
-                    blue += share * source[at + np.uint64(2)]
-                    at += np.uint64(3)
-                out[3 * k], out[3 * k + 1], out[3 * k + 2] = red, green, blue
-            else:
-                for c in range(channels):
-                    total = np.float32(0)
-                    for t in range(column_shares.shape[1]):
-                        total += column_shares[k, t] * source[at + np.uint64(t * channels + c)]
-                    out[k * channels + c] = total
+        divided[l - low] = 0
+        add_along_row(source, first_column, column_shares, channels, 0, divided[l - low])
 
 
-@_inlined
+@fast_inlined
+def add_along_row(source, first, shares, channels, start, out):  # type: ignore[no-untyped-def]
+    """out[start + k · channels + c] += Σ shares[k, t] · source[(first[k] + t) · channels + c] over t."""
+    for k in range(first.size):
+        at, to = np.uint64(first[k] * channels), start + k * channels
+        if channels == 3:
+            red, green, blue = np.float32(0), np.float32(0), np.float32(0)
+            for t in range(shares.shape[1]):
+                share = shares[k, t]
+                red += share * source[at]
+                green += share * source[at + np.uint64(1)]
+                blue += share * source[at + np.uint64(2)]
+                at += np.uint64(3)
+            out[to] += red
+            out[to + 1] += green
+            out[to + 2] += blue
+        else:
+            for c in range(channels):
+                total = np.float32(0)
+                for t in range(shares.shape[1]):
+                    total += shares[k, t] * source[at + np.uint64(t * channels + c)]
+                out[to + c] += total
+
+
+@fast_inlined
 def columns_around(column, columns):  # type: ignore[no-untyped-def]
     """The three columns around each place, (3, places), and their weights there, float32.
 
@@ -287,7 +292,7 @@ def columns_around(column, columns):  # type: ignore[no-untyped-def]
     return points, counts
 
 
-@_compiled
+@fast_loop
 def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untyped-def]
     """out[r, k · repeat + c] = texture[r] at column[k], by quadratic B-splines, zero outside."""
     points, counts = columns_around(column, texture.shape[1])
@@ -305,7 +310,7 @@ def sample_mask_columns(texture, column, repeat, out):  # type: ignore[no-untype
                     to[k * repeat + n] = value
 
 
-@_compiled
+@fast_loop
 def mix_columns(sums, first, shares, channels, turned, tiles):  # type: ignore[no-untyped-def]
     """tiles[i, x · channels + c, y] += Σ share · sums[8i + y, k · channels + c] over samples k that reach x.
 
@@ -326,7 +331,16 @@ def mix_columns(sums, first, shares, channels, turned, tiles):  # type: ignore[n
                 mix_eight(turned, step * first[x] + EIGHT * n, step, shares, x, out, step * x + EIGHT * n)
 
 
-@_compiled
+@fast_loop
+def turned(raster, tile, tiles):  # type: ignore[no-untyped-def]
+    """tiles[tile, x, y] = raster[8 · tile + y, x]: eight rows transposed, zero beyond the last."""
+    start = EIGHT * tile
+    for y in range(min(EIGHT, raster.shape[0] - start)):
+        for x in range(raster.shape[1]):
+            tiles[tile, x, y] = raster[start + y, x]
+
+
+@fast_loop
 def raster_of(tiles, channels, mirrored, band, raster):  # type: ignore[no-untyped-def]
     """Copy a band's rows of the raster, (rows, columns · channels), from tiles in the layout of `mix_columns`."""
     start, stop = band
@@ -340,7 +354,7 @@ def raster_of(tiles, channels, mirrored, band, raster):  # type: ignore[no-untyp
                     raster[EIGHT * tile + y, to + n] = tiles[tile, x * channels + n, y]
 
 
-@_compiled
+@fast_loop
 def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
     """A band's rows of the image: the raster convolved down and across, cropped by its guard, times transmission.
 
@@ -374,7 +388,7 @@ def filter_rows(raster, finish, band, picture):  # type: ignore[no-untyped-def]
                     out[x * channels + c] *= np.float32(transmission[y, x])
 
 
-@_inlined
+@fast_inlined
 def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
     """Φ of `vcc.plan.footprints.shares`; interpolation 1 is linear, 2 cubic, 3 spline, 4 box."""
     r = abs(a)
@@ -393,7 +407,7 @@ def _cumulative(interpolation, a):  # type: ignore[no-untyped-def]
     return 0.5 + half if a >= 0 else 0.5 - half
 
 
-@_inlined
+@fast_inlined
 def share_at(footprint, offset, size):  # type: ignore[no-untyped-def]
     """Share of a sample's light on a pixel at distance ``offset``; ``size`` is the distance of the samples."""
     interpolation, _, opening = footprint
@@ -404,13 +418,26 @@ def share_at(footprint, offset, size):  # type: ignore[no-untyped-def]
     return (upper - _cumulative(interpolation, (offset - opening / 2) / size)) / opening
 
 
-@_inlined
+@fast_inlined
 def farthest(footprint, size):  # type: ignore[no-untyped-def]
     """Largest distance from a pixel, in pixels, at which a sample contributes to it."""
     return 1e-6 + (max(size, 1.0) / 2 if footprint.interpolation == 0 else footprint.reach * size + 0.5)
 
 
-@_compiled
+@fast_inlined
+def around(middle, reach, count):  # type: ignore[no-untyped-def]
+    """(first, after the last) of the numbers 0 … count − 1 that are at most ``reach`` from a place."""
+    return max(np.int64(math.ceil(middle - reach)), 0), min(np.int64(math.floor(middle + reach)) + 1, count)
+
+
+@fast_inlined
+def place_on_mask(place, step, mask, k, l):  # type: ignore[no-untyped-def]
+    """(row, column) on a mask of sample (k, l). place: `View.masks`. step: `Textures.step`."""
+    column = place[mask, 0] + step[mask, 0, 0] * k + step[mask, 0, 1] * l
+    return place[mask, 1] + step[mask, 1, 0] * k + step[mask, 1, 1] * l, column
+
+
+@fast_loop
 def weigh_samples(view, grid, masks, band):  # type: ignore[no-untyped-def]
     """Multiply a band of rows of a view's samples by the masks, in place, if rows and columns are sheared.
 
@@ -424,14 +451,13 @@ def weigh_samples(view, grid, masks, band):  # type: ignore[no-untyped-def]
             k = grid.first_k + n / grid.refine
             weight = np.float32(1)
             for mask in range(place.shape[0]):
-                column = place[mask, 0] + mask_step[mask, 0, 0] * k + mask_step[mask, 0, 1] * l
-                row = place[mask, 1] + mask_step[mask, 1, 0] * k + mask_step[mask, 1, 1] * l
+                row, column = place_on_mask(place, mask_step, mask, k, l)
                 weight *= dark_outside(textures[mask, : size[mask, 0], : size[mask, 1]], row, column)
             for c in range(samples.shape[2]):
                 samples[m, n, c] *= weight
 
 
-@_compiled
+@fast_loop
 def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untyped-def]
     """Add one view to a band's raster rows, (rows, columns, channels), if rows and columns of samples are sheared.
 
@@ -451,9 +477,8 @@ def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untype
             k = first_k + n / refine
             y_start = y0 + step[1, 0] * k + coarse_row_step * first_l
             middle = (y - y_start) / row_step
-            low = max(int(np.ceil(middle - reach_y / height)), 0)
-            high = min(int(np.floor(middle + reach_y / height)), nt - 1)
-            for m in range(low, high + 1):
+            low, high = around(middle, reach_y / height, nt)
+            for m in range(low, high):
                 share = weight * share_at(footprint, y - y_start - row_step * m, height)
                 if share != 0:
                     lit = True
@@ -463,9 +488,8 @@ def sheared_view(view, grid, footprint, band, raster):  # type: ignore[no-untype
             continue
         for n in range(ns):
             x = x0 + shear * (y - y0) + coarse_column_step * (first_k + n / refine)
-            low = max(int(np.ceil(x - reach_x)), 0)
-            high = min(int(np.floor(x + reach_x)), raster.shape[1] - 1)
-            for pixel in range(low, high + 1):
+            low, high = around(x, reach_x, raster.shape[1])
+            for pixel in range(low, high):
                 share = share_at(footprint, pixel - x, width)
                 for c in range(channels):
                     raster[y, pixel, c] += share * line[n, c]

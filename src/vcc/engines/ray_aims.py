@@ -10,21 +10,15 @@ import math
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ray_back, ray_inlined, ray_inner
 from vcc.engines.ray_steps import cell_of, centre_of
 from vcc.plan.rays.points import DIGITS
 
 DIGITS_ABOVE, DIGITS_BELOW = np.float32(2.0**DIGITS), 2.0**-DIGITS
 """Factors from a point to its digits as an integer, and back."""
 
-_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
-_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Called by compiled code only: no wrapper for Python is compiled."""
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 
-
-@_inner
+@ray_inner
 def hashed(number, seed):  # type: ignore[no-untyped-def]
     """See `vcc.plan.rays.points.hashed`."""
     h = np.uint32(number & 0xFFFFFFFF) ^ np.uint32((seed * 0x9E3779B1) & 0xFFFFFFFF)
@@ -33,26 +27,26 @@ def hashed(number, seed):  # type: ignore[no-untyped-def]
     return np.uint32(h ^ (h >> np.uint32(16)))
 
 
-@_inlined
+@ray_inlined
 def first_point(points, pixel):  # type: ignore[no-untyped-def]
     """Where the points of a pixel begin in their table; see `vcc.plan.rays.model.Rays.block`."""
     table, samples, beside, seed = points
     return ((np.int64(hashed(pixel, seed)) * (table.shape[1] // samples) >> 32) ^ beside) * samples
 
 
-@_inlined
+@ray_inlined
 def middle_of(sensor, row, column):  # type: ignore[no-untyped-def]
     """The position (x, y) of the centre of a pixel."""
     return sensor.first[0] + column * sensor.pitch[0], sensor.first[1] + row * sensor.pitch[1]
 
 
-@_inlined
+@ray_inlined
 def unit(point, flipped):  # type: ignore[no-untyped-def]
     """A number 0 … 1 of `DIGITS` binary digits, some of them flipped; see `vcc.plan.rays.model.Rays._moved`."""
     return (np.float64(np.int32(point * DIGITS_ABOVE) ^ flipped) + 0.5) * DIGITS_BELOW
 
 
-@_inner
+@ray_inner
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
     """Set the positions of a packet's rays on the sensitive area of a pixel."""
     points, start, n, flipped = drawn
@@ -64,7 +58,7 @@ def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
         y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
 
-@_inner
+@ray_inner
 def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     """(power, δs, δt) of a cell; no divisions if there is one kind, the usual case."""
     rows, columns = kinds.shape[0], kinds.shape[1]
@@ -73,7 +67,7 @@ def kind_of(kinds, row, column):  # type: ignore[no-untyped-def]
     return kinds[r, c, 0], kinds[r, c, 1], kinds[r, c, 2]
 
 
-@_inlined
+@ray_inlined
 def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-untyped-def]
     """Set the numbers from which `through_cell` computes the stop's image seen through a cell, along one axis."""
     gain = cells.beyond[axis] + power * cells.beyond_from_slope[axis]
@@ -88,7 +82,7 @@ def set_image(image, cells, axis, centre, power, slope):  # type: ignore[no-unty
     image[4] = cells.cell_half[axis]
 
 
-@_inner
+@ray_inner
 def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the (row, column) of the cells through which a pixel sees the stop; return the count."""
     beyond, from_sensor, from_slope = cells.beyond, cells.beyond_from_sensor, cells.beyond_from_slope
@@ -117,7 +111,7 @@ def cells_seen(cells, x, y, sensitive, near):  # type: ignore[no-untyped-def]
     return found
 
 
-@_inlined
+@ray_inlined
 def cells_at(by_cell, cells, middle, sensitive, near):  # type: ignore[no-untyped-def]
     """Fill ``near`` with the cells that a pixel is traced through; return their number, 1 for a window."""
     seen = 1
@@ -126,7 +120,7 @@ def cells_at(by_cell, cells, middle, sensitive, near):  # type: ignore[no-untype
     return seen
 
 
-@_inlined
+@ray_inlined
 def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ignore[no-untyped-def]
     """Set the digits to flip for a pixel, and the stop's image for cell ``q`` of ``near`` if there are cells."""
     number = np.int64(pixel)
@@ -140,7 +134,7 @@ def turn_to(by_cell, cells, seed, pixel, near, q, images, flipped):  # type: ign
         flipped[n] = hashed(number, seed + 1 + n) >> np.uint32(32 - DIGITS)
 
 
-@_inlined
+@ray_inlined
 def visible_point(window, x, y, a, b):  # type: ignore[no-untyped-def]
     """A point of the unit disc mapped on the part of the pupil that (x, y) sees, and the factor of its area.
 
@@ -168,7 +162,7 @@ def visible_point(window, x, y, a, b):  # type: ignore[no-untyped-def]
     return cosine * along - sine * aside, sine * along + cosine * aside, half * across * out * out
 
 
-@_inner
+@ray_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, with diffusers compensated."""
     points, start, n, flipped = drawn
@@ -208,7 +202,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
             t[p] += g0 * a + g1 * b
 
 
-@_inner
+@ray_inner
 def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays through the part of a cell that sees the stop; see `CellWindows.aimed`.
 
@@ -253,7 +247,7 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
         share[p] = weight * wide * tall
 
 
-@_inlined
+@ray_inlined
 def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-untyped-def]
     """Start a packet's rays at the sensor and aim them at the window or through the cell."""
     at_pixel(drawn, middle, sensitive, rays)
@@ -266,7 +260,7 @@ def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-un
 # --- backward ---
 
 
-@_back
+@ray_back
 def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
     """Gradients of the rays' positions on the sensor to its first pixel, pitch and sensitive area."""
     points, start, n, flipped = drawn
@@ -281,7 +275,7 @@ def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
         own[4 + q] += of_area
 
 
-@_back
+@ray_back
 def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type: ignore[no-untyped-def]
     """Gradients of slopes and weights through a window to positions, drawn points and its parameters."""
     points, start, n, flipped = drawn
@@ -333,7 +327,7 @@ def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type:
                 out_points[column + 1, start + p] += f1 * s + g1 * t
 
 
-@_back
+@ray_back
 def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[no-untyped-def]
     """Gradients of slopes and weights through a cell to positions, to the stop's image there and to the cell.
 
@@ -446,7 +440,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
     image_back(images, cells, cell, sums, own, kinds)
 
 
-@_back
+@ray_back
 def image_back(images, cells, cell, sums, own, kinds):  # type: ignore[no-untyped-def]
     """Gradients from the sums of `cell_back` to the numbers from which `set_image` computes a cell's image."""
     power, slope_x, slope_y = kind_of(cells.kinds, cell[0], cell[1])

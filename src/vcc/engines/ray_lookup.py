@@ -10,18 +10,11 @@ import math
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ray_back, ray_inlined, ray_inner, ray_loop
 from vcc.engines.vector_gather import LANES, add_views_of_1, add_views_of_3, add_views_of_4
 
-_compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
-_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
-_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Called by compiled code only: no wrapper for Python is compiled."""
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they vectorise."""
 
-
-@_inner
+@ray_inner
 def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
     """Replace the positions and slopes of n rays by their indices (i, j, k, l), by a 4×5 matrix."""
     x, y, s, t, _ = rays
@@ -45,7 +38,7 @@ def to_indices(m, rays, n):  # type: ignore[no-untyped-def]
         t[p] = m[3, 0] * xp + m[3, 1] * yp + m[3, 2] * sp + m[3, 3] * tp + m[3, 4]
 
 
-@_inlined
+@ray_inlined
 def views_of_ray(i, j, nu, nv, between):  # type: ignore[no-untyped-def]
     """The first of the views around a ray, (i0, j0), and the fraction of the way to the next ones, (fi, fj).
 
@@ -58,13 +51,13 @@ def views_of_ray(i, j, nu, nv, between):  # type: ignore[no-untyped-def]
     return int(ci + 0.5), int(cj + 0.5), 0.0, 0.0
 
 
-@_inlined
+@ray_inlined
 def dark_from(motion):  # type: ignore[no-untyped-def]
     """How far outside the views, in samples (k, l), all views around a ray are dark."""
     return 1.0 + 1.5 * (abs(motion[0, 0]) + abs(motion[0, 1])), 1.0 + 1.5 * (abs(motion[1, 0]) + abs(motion[1, 1]))
 
 
-@_inlined
+@ray_inlined
 def may_find_light(i, j, k, l, views, dark):  # type: ignore[no-untyped-def]
     """Whether a ray meets the grid of views, and falls on their pixels or less than ``dark`` outside them."""
     nv, nu, nt, ns = views
@@ -73,7 +66,21 @@ def may_find_light(i, j, k, l, views, dark):  # type: ignore[no-untyped-def]
     return k > -dark[0] and k < ns - 1 + dark[0] and l > -dark[1] and l < nt - 1 + dark[1]
 
 
-@_inlined
+@ray_inlined
+def places_in_four_views(motion, away_i, away_j, k, l):  # type: ignore[no-untyped-def]
+    """Where a ray falls on four views, if the axes are separable, from its place relative to the first of them.
+
+    Returns:
+        The columns of samples to the left of it, in the left views and in the right ones; the rows above it, in
+        the upper views and in the lower ones; fractions of a sample beyond both, see `weights_in_four_views`.
+    """
+    k0, l0 = k + motion[0, 0] * away_i, l + motion[1, 1] * away_j
+    k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
+    kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
+    return (int(kf0), int(kf1)), (int(lf0), int(lf1)), ((k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1))
+
+
+@ray_inlined
 def corners_in_four_views(base, across, down, picture, row_of_views):  # type: ignore[no-untyped-def]
     """Where the first of the samples around a ray begins in each of the four views around it.
 
@@ -90,7 +97,7 @@ def corners_in_four_views(base, across, down, picture, row_of_views):  # type: i
     return upper[0], upper[1], lower[0], lower[1]
 
 
-@_inlined
+@ray_inlined
 def weights_in_four_views(weight, fi, fj, parts):  # type: ignore[no-untyped-def]
     """Weights of two rows and two columns of samples in each of four views, if the axes are separable.
 
@@ -113,7 +120,7 @@ def weights_in_four_views(weight, fi, fj, parts):  # type: ignore[no-untyped-def
     return (upper - above, above, lower - below, below), (one - fi - left, left, fi - right, right)
 
 
-@_inner
+@ray_inner
 def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def]
     """Add a view's value at pixel (k, l), interpolated linearly and dark outside, times a weight.
 
@@ -163,7 +170,7 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
                     found[channel] += w * values[base + ((r + dr) * columns + c + dc) * channels + channel]
 
 
-@_inlined
+@ray_inlined
 def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
     """Look up a packet of n rays in the light field and add the results to sums (half, `LANES` or channels).
 
@@ -190,16 +197,13 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
             continue
         i0, j0, fi, fj = views_of_ray(i, j, nu, nv, between)  # motion is zero if views are not interpolated
         if vectors:
-            k0, l0 = k + motion[0, 0] * (i - i0), l + motion[1, 1] * (j - j0)
-            k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
-            kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
-            c0, c1 = int(kf0) - first_columns[i0], int(kf1) - first_columns[i0 + 1]
-            r0, r1 = int(lf0) - first_rows[j0], int(lf1) - first_rows[j0 + 1]
+            (c0, c1), (r0, r1), parts = places_in_four_views(motion, i - i0, j - j0, k, l)
+            c0, c1 = c0 - first_columns[i0], c1 - first_columns[i0 + 1]
+            r0, r1 = r0 - first_rows[j0], r1 - first_rows[j0 + 1]
             inside = min(c0, c1) >= 0 and max(c0, c1) < wide - 1 and min(r0, r1) >= 0 and max(r0, r1) < high - 1
             c0, c1, r0, r1 = c0 * channels, c1 * channels, r0 * line, r1 * line
             base = j0 * row_of_views + i0 * picture
             if inside and base + row_of_views + picture + max(r0, r1) + line + max(c0, c1) <= last:
-                parts = (k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1)
                 corners = corners_in_four_views(base, (c0, c1), (r0, r1), picture, row_of_views)
                 rows, columns = weights_in_four_views(weight, fi, fj, parts)
                 at = half * sums.shape[1]
@@ -228,7 +232,7 @@ def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-de
 # --- backward ---
 
 
-@_compiled
+@ray_loop
 def spread_view(grown, base, k, l, weight, weights, pixel):  # type: ignore[no-untyped-def]
     """Add a pixel's gradient to a view's samples around (k, l); the transpose of `add_view`."""
     values, (_, _, rows, columns), channels, _, _ = grown
@@ -244,7 +248,7 @@ def spread_view(grown, base, k, l, weight, weights, pixel):  # type: ignore[no-u
                     values[at + channel] += w * weights[pixel + channel]
 
 
-@_back
+@ray_back
 def field_back(field, weights, n, index, lit, bar, to_motion, to_scale):  # type: ignore[no-untyped-def]
     """Fill ``bar`` (5, rays), the cotangents of indices and shares of rays, from the light field."""
     (values, views, channels), _, _, motion, between = field

@@ -14,11 +14,9 @@ through the steps.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_loop, ordered_loop, ray_back, ray_back_inlined, ray_inlined, ray_loop
 from vcc.engines.ray_aims import (
     aim_rays,
     at_pixel,
@@ -39,6 +37,7 @@ from vcc.engines.ray_lookup import (
     dark_from,
     field_back,
     may_find_light,
+    places_in_four_views,
     spread_view,
     to_indices,
     views_of_ray,
@@ -52,23 +51,15 @@ from vcc.plan.rays.points import DIGITS
 PACKET = 256
 """Rays of a packet: their six numbers each stay in the first-level cache."""
 
-_compiled = compiled(borrowing=True, fastmath={"contract", "nsz"})
-_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
-_allocating = compiled(fastmath={"contract", "nsz"})
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they vectorise."""
-_inlined_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
-_allocating_back = compiled(fastmath={"contract", "nsz", "reassoc"})
 
-
-@_allocating
+@ordered_loop
 def working_arrays():  # type: ignore[no-untyped-def]
     """Buffers for tracing: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
     rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
     return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
 
 
-@_compiled
+@ray_loop
 def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile into pictures (2, rows, columns, channels); arguments: `vcc.engines.ray_tables`.
 
@@ -145,7 +136,7 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
 # --- back to samples ---
 
 
-@_inlined
+@ray_inlined
 def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-def]
     """Store the places of those of n rays that reach the light field; return how many places are stored now.
 
@@ -169,7 +160,7 @@ def keep_rays(look, rays, n, pixel, found, filled):  # type: ignore[no-untyped-d
     return filled
 
 
-@_compiled
+@ray_loop
 def put_in_order(found, filled):  # type: ignore[no-untyped-def]
     """Sort the stored places by view."""
     places, views, ordered, begin = found
@@ -188,7 +179,7 @@ def put_in_order(found, filled):  # type: ignore[no-untyped-def]
     begin[0] = 0
 
 
-@_allocating
+@ordered_loop
 def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile from its pixel ``start`` on, until the buffers for their places are full.
 
@@ -199,7 +190,7 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # t
     return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, working_arrays())
 
 
-@_compiled
+@ray_loop
 def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
     """As `find_tile`, with buffers from `working_arrays`."""
     table, samples, _, seed = points
@@ -234,7 +225,7 @@ def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, wit
     return number
 
 
-@_compiled
+@ray_loop
 def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-def]
     """Add the gradients of the rays whose first view is in a row of views to the samples.
 
@@ -265,20 +256,10 @@ def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-
                     continue
                 fi, fj = min(max(i, 0.0), nu - 1.0) - column, min(max(j, 0.0), nv - 1.0) - row
                 if vectors:
-                    k0, l0 = k + motion[0, 0] * (i - column), l + motion[1, 1] * (j - row)
-                    k1, l1 = k0 - motion[0, 0], l0 - motion[1, 1]
-                    kf0, kf1, lf0, lf1 = math.floor(k0), math.floor(k1), math.floor(l0), math.floor(l1)
-                    inside = (
-                        min(kf0, kf1) >= 0
-                        and max(kf0, kf1) < ns - 1
-                        and min(lf0, lf1) >= 0
-                        and max(lf0, lf1) < nt - 1
-                    )
-                    if inside:
-                        c0, c1 = int(kf0) * channels, int(kf1) * channels
-                        r0, r1 = int(lf0) * line, int(lf1) * line
-                        parts = (k0 - kf0, k1 - kf1), (l0 - lf0, l1 - lf1)
-                        corners = corners_in_four_views(base, (c0, c1), (r0, r1), picture, row_of_views)
+                    (c0, c1), (r0, r1), parts = places_in_four_views(motion, i - column, j - row, k, l)
+                    if min(c0, c1) >= 0 and max(c0, c1) < ns - 1 and min(r0, r1) >= 0 and max(r0, r1) < nt - 1:
+                        across, down = (c0 * channels, c1 * channels), (r0 * line, r1 * line)
+                        corners = corners_in_four_views(base, across, down, picture, row_of_views)
                         rows, columns = weights_in_four_views(weight, fi, fj, parts)
                         if channels == 3:
                             spread_views_of_3(values, corners, line, rows, columns, weights, pixel)
@@ -305,7 +286,7 @@ def spread_row(grown, weights, ordered, begin, row):  # type: ignore[no-untyped-
 # --- back to numbers ---
 
 
-@_inlined_back
+@ray_back_inlined
 def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
     """Set ``lit`` to 1 for rays that carry light, else to 0; return how many do."""
     number = 0
@@ -316,7 +297,7 @@ def lit_by(share, n, lit):  # type: ignore[no-untyped-def]
     return number
 
 
-@_inlined_back
+@ray_back_inlined
 def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gradients):  # type: ignore[no-untyped-def]
     """Trace a packet of rays from the sensor (``ways[0][0]``), and go backward with the samples that they read.
 
@@ -348,7 +329,7 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gr
         pixel_back(drawn, place, bar, gradients.sensor)
 
 
-@_allocating_back
+@fast_loop
 def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradients, tiles):  # type: ignore[no-untyped-def]
     """Add the gradients of the pixels of some tiles to ``gradients``; arguments: `vcc.engines.ray_tables`.
 
@@ -360,7 +341,7 @@ def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradie
     gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, working_arrays(), ways)
 
 
-@_back
+@ray_back
 def gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
     """As `gradients_of_tiles`, with buffers from `working_arrays` and for `packet_back`."""
     table, samples, _, seed = points

@@ -7,14 +7,10 @@ from __future__ import annotations
 
 import math
 
-from vcc.engines.compiled import compiled
-
-_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-_outer = compiled(borrowing=True, fastmath={"contract", "nsz"})
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
+from vcc.engines.compiled import ray_back, ray_inner, ray_loop
 
 
-@_inner
+@ray_inner
 def within(a, f, table, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     """Whether a ray is within the opening, in the units of the map."""
     u = ax * ax + ay * ay
@@ -34,7 +30,7 @@ def within(a, f, table, ax, ay, bx, by):  # type: ignore[no-untyped-def]
     return far <= low + p * (high - low)
 
 
-@_outer
+@ray_loop
 def through_map(a, f, table, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """Step 15: map a packet; rays outside the opening get the share 0, on the axis."""
     order, start = a[0], a[1] * a[2]
@@ -64,7 +60,7 @@ def through_map(a, f, table, n, x, y, s, t, share):  # type: ignore[no-untyped-d
         s[p], t[p] = slope_a * ax + slope_b * bx, slope_a * ay + slope_b * by
 
 
-@_back
+@ray_back
 def map_back(a, f, table, n, before, bar):  # type: ignore[no-untyped-def]
     """Turn cotangents behind a map into those before it, in place; see `vcc.optics.ray_map.RayMap.pulled`."""
     order, start = a[0], a[1] * a[2]

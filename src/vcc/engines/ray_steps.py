@@ -14,21 +14,14 @@ import math
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ray_back, ray_back_inlined, ray_inlined, ray_inner
 from vcc.engines.interpolation import around, bilinear
 from vcc.engines.ray_maps import map_back, through_map
 from vcc.engines.ray_surfaces import surface_back, through_surface
 from vcc.engines.ray_tables import Packet, Steps
 
-_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
-_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-"""Called by compiled code only: no wrapper for Python is compiled."""
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
-"""Sums over the rays of a packet may be reordered, so that they vectorise."""
-_inlined_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"}, inline="always")
 
-
-@_inner
+@ray_inner
 def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     """(row, column, centre x, centre y) of the cell around a place; ``turn`` as in `steps._lattice_numbers`."""
     cosine, sine, offset_x, offset_y, pitch, height = turn[0], turn[1], turn[2], turn[3], turn[4], turn[5]
@@ -58,7 +51,7 @@ def cell_of(layout, turn, x, y):  # type: ignore[no-untyped-def]
     )
 
 
-@_inner
+@ray_inner
 def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     """(x, y) of the centre of a cell."""
     shifted = column * turn[4]
@@ -68,7 +61,7 @@ def centre_of(layout, turn, row, column):  # type: ignore[no-untyped-def]
     return turn[0] * shifted - turn[1] * down + turn[2], turn[1] * shifted + turn[0] * down + turn[3]
 
 
-@_inner
+@ray_inner
 def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     """(columns, row, next row, column, next column, fraction down, fraction right) of a place on a texture."""
     c, c1, right = around((x - real[0]) * real[2], columns)
@@ -76,7 +69,7 @@ def corner(x, y, rows, columns, real):  # type: ignore[no-untyped-def]
     return columns, r, r1, c, c1, down, right
 
 
-@_inner
+@ray_inner
 def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     """One of ``width`` values per point of the texture at ``start``, interpolated at a place from `corner`."""
     columns, r, r1, c, c1, down, right = at
@@ -91,7 +84,7 @@ def mixed(table, start, width, number, at):  # type: ignore[no-untyped-def]
     )
 
 
-@_inner
+@ray_inner
 def by_ray(table, a, f, x, y, s, t):  # type: ignore[no-untyped-def]
     """Step 16: the sum of products of a function of place and one of slope."""
     there, towards = corner(x, y, a[0], a[1], f), corner(s, t, a[3], a[4], f[4:])
@@ -101,7 +94,33 @@ def by_ray(table, a, f, x, y, s, t):  # type: ignore[no-untyped-def]
     return total
 
 
-@_inlined
+@ray_inlined
+def facet_at(slopes, a, f, x, y):  # type: ignore[no-untyped-def]
+    """Step 4: where the numbers (direction, slopes) of the facet at a place begin."""
+    dx, dy = x - f[0], y - f[1]
+    best, at = -np.inf, a[1]
+    for facet in range(a[0]):
+        outward = dx * slopes[a[1] + 4 * facet] + dy * slopes[a[1] + 4 * facet + 1]
+        if outward > best:
+            best, at = outward, a[1] + 4 * facet
+    return at
+
+
+@ray_inlined
+def kernel_at(shares, points, a, f, x, y, ray):  # type: ignore[no-untyped-def]
+    """Step 10: the column of points of the kernel that is drawn for a ray at a place, and how it is stretched."""
+    kernel, stretch = 0, 1.0
+    if a[3] > 0:
+        at = corner(x, y, a[3], a[4], f)
+        picked = points[a[2], ray]
+        while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, at):
+            kernel += 1
+    if a[6] > 0:
+        stretch = mixed(shares, a[8], 1, 0, corner(x, y, a[6], a[7], f[4:]))
+    return a[0] + 2 * kernel, stretch
+
+
+@ray_inlined
 def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
     """Step 0: an affine map along x and another along y."""
     f0, f1, f2, f3, f4, f5 = f[0], f[1], f[2], f[3], f[4], f[5]
@@ -116,7 +135,7 @@ def part_affinely(f, n, x, y, s, t):  # type: ignore[no-untyped-def]
         t[p] = f3 * yp + f4 * tp + f5
 
 
-@_inlined
+@ray_inlined
 def within_disc(f, n, x, y, share):  # type: ignore[no-untyped-def]
     """Step 6: dark outside a disc."""
     f0, f1, f2 = f[0], f[1], f[2]
@@ -125,7 +144,7 @@ def within_disc(f, n, x, y, share):  # type: ignore[no-untyped-def]
         share[p] = share[p] if dx * dx + dy * dy <= f2 else 0.0
 
 
-@_inlined
+@ray_inlined
 def within_rectangle(f, n, x, y, share):  # type: ignore[no-untyped-def]
     """Step 7: dark outside a rectangle."""
     f0, f1, f2, f3 = f[0], f[1], f[2], f[3]
@@ -137,7 +156,7 @@ FEW = frozenset({0, 6, 7})
 """Codes of the steps of a plain lens: affine maps along x and y, a round aperture, a rectangular one."""
 
 
-@_inner
+@ray_inner
 def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """As `take_steps` if all steps are in `FEW`; compiling these takes a tenth of the time."""
     codes, _, real, _, _ = steps
@@ -153,7 +172,7 @@ def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
             within_rectangle(f, n, x, y, share)
 
 
-@_inner
+@ray_inner
 def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """Take a packet of rays through all steps.
 
@@ -208,12 +227,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 share[p] *= (row >= 0) & (row < a[1]) & (column >= 0) & (column < a[2])
         elif code == 4:
             for p in range(n):
-                dx, dy = x[p] - f[0], y[p] - f[1]
-                best, at = -np.inf, a[1]
-                for facet in range(a[0]):
-                    outward = dx * slopes[a[1] + 4 * facet] + dy * slopes[a[1] + 4 * facet + 1]
-                    if outward > best:
-                        best, at = outward, a[1] + 4 * facet
+                at = facet_at(slopes, a, f, x[p], y[p])
                 s[p] -= slopes[at + 2]
                 t[p] -= slopes[at + 3]
         elif code == 5:
@@ -260,30 +274,21 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
                 share[p] *= per_square * per_square
         else:
             for p in range(n):
-                kernel = 0
-                if a[3] > 0:
-                    at = corner(x[p], y[p], a[3], a[4], f)
-                    picked = points[a[2], first + p]
-                    while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, at):
-                        kernel += 1
-                stretch = 1.0
-                if a[6] > 0:
-                    at = corner(x[p], y[p], a[6], a[7], f[4:])
-                    stretch = mixed(shares, a[8], 1, 0, at)
-                s[p] -= stretch * points[a[0] + 2 * kernel, first + p]
-                t[p] -= stretch * points[a[0] + 2 * kernel + 1, first + p]
+                column, stretch = kernel_at(shares, points, a, f, x[p], y[p], first + p)
+                s[p] -= stretch * points[column, first + p]
+                t[p] -= stretch * points[column + 1, first + p]
 
 
 # --- and back ---
 
 
-@_inlined_back
+@ray_back_inlined
 def packet_of(numbers):  # type: ignore[no-untyped-def]
     """A packet of rays from an array (5, rays)."""
     return Packet(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
 
 
-@_back
+@ray_back
 def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyped-def]
     """Take a packet (5, rays) through one step; ``lit`` becomes 0 for rays that a hard edge stops."""
     codes, whole, real, shares, slopes = steps
@@ -308,7 +313,7 @@ def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyp
             behind[4, p] *= before[4, p]
 
 
-@_back
+@ray_back
 def moved_back(m, n, before, bar, own):  # type: ignore[no-untyped-def]
     """Take cotangents of places and slopes back through the 4×5 map ``m``; add the map's gradients to ``own``."""
     for q in range(4):
@@ -334,7 +339,7 @@ def moved_back(m, n, before, bar, own):  # type: ignore[no-untyped-def]
         bar[3, p] = m[3] * x + m[8] * y + m[13] * s + m[18] * t
 
 
-@_back
+@ray_back
 def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no-untyped-def]
     """Backward of a texture lookup: add gradients to the places of a packet and to the texture.
 
@@ -383,7 +388,7 @@ def texture_back(table, sizes, real, rays, values, out, own):  # type: ignore[no
     own[3] += s3
 
 
-@_back
+@ray_back
 def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[no-untyped-def]
     """Turn the cotangents ``bar`` (5, rays) of a packet behind a step into those before it, in place.
 
@@ -421,12 +426,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
         own[3] += s3
     elif code == 4:
         for p in range(n):
-            dx, dy = x[p] - f[0], y[p] - f[1]
-            best, at = -np.inf, a[1]
-            for facet in range(a[0]):
-                outward = dx * slopes[a[1] + 4 * facet] + dy * slopes[a[1] + 4 * facet + 1]
-                if outward > best:
-                    best, at = outward, a[1] + 4 * facet
+            at = facet_at(slopes, a, f, x[p], y[p])
             if len(out_slopes) > 0:
                 out_slopes[at + 2] -= gs[p]
                 out_slopes[at + 3] -= gt[p]
@@ -490,16 +490,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             gw[p] *= per_square * per_square
     elif code == 10:
         for p in range(n):
-            kernel = 0
-            if a[3] > 0:
-                at = corner(x[p], y[p], a[3], a[4], f)
-                picked = points[a[2], first + p]
-                while kernel < a[1] - 1 and picked >= mixed(shares, a[5], a[1], kernel, at):
-                    kernel += 1
-            column = a[0] + 2 * kernel
-            stretch = 1.0
-            if a[6] > 0:
-                stretch = mixed(shares, a[8], 1, 0, corner(x[p], y[p], a[6], a[7], f[4:]))
+            column, stretch = kernel_at(shares, points, a, f, x[p], y[p], first + p)
             found[0, p] = -(gs[p] * points[column, first + p] + gt[p] * points[column + 1, first + p])
             if len(out_points) > 0:
                 out_points[column, first + p] -= stretch * gs[p]
@@ -508,7 +499,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
             texture_back(shares, (n, a[6], a[7], a[8], 1), f[4:], (x, y, gx, gy), found[:1], out_shares, own)
 
 
-@_back
+@ray_back
 def cosines(frequency, middle, phase, harmonics, place):  # type: ignore[no-untyped-def]
     """(½ + Σ cos(nθ)/2h, its derivative to θ) of a cosine mask along one axis; (1, 0) if it is constant."""
     if not frequency > 0.0:

@@ -7,16 +7,11 @@ from __future__ import annotations
 
 import math
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ray_back, ray_inlined, ray_inner, ray_loop
 from vcc.optics.refraction import NEWTON_STEPS
 
-_inlined = compiled(borrowing=True, fastmath={"contract", "nsz"}, inline="always")
-_inner = compiled(borrowing=True, no_cpython_wrapper=True, fastmath={"contract", "nsz"})
-_outer = compiled(borrowing=True, fastmath={"contract", "nsz"})
-_back = compiled(borrowing=True, fastmath={"contract", "nsz", "reassoc"})
 
-
-@_inlined
+@ray_inlined
 def through_sphere(f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """A sphere or plane with a hard edge: no branches, so that the loop vectorises."""
     distance, c, ratio, edge, passes = f[0], f[1], f[3], f[4] * f[4], f[6]
@@ -43,7 +38,7 @@ def through_sphere(f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
         share[p] = share[p] * passes if lit else 0.0
 
 
-@_inner
+@ray_inner
 def sag_of(c, conic, a, f, square):  # type: ignore[no-untyped-def]
     """(z, ∂z/∂r², root of the conic) of a surface; ``a``: [.., number of aspheric coefficients]."""
     root = math.sqrt(max(1.0 - (1.0 + conic) * c * c * square, 0.0))
@@ -55,7 +50,7 @@ def sag_of(c, conic, a, f, square):  # type: ignore[no-untyped-def]
     return sag, steep, root
 
 
-@_inner
+@ray_inner
 def met_at(a, f, x, y, s, t):  # type: ignore[no-untyped-def]
     """(far, l, m, n) of a ray: how far along its direction (l, m, n) it meets the surface; NaN: it does not.
 
@@ -81,7 +76,7 @@ def met_at(a, f, x, y, s, t):  # type: ignore[no-untyped-def]
     return far, l, m, n
 
 
-@_inner
+@ray_inner
 def share_of(a, f, square, arriving, leaving):  # type: ignore[no-untyped-def]
     """The share of light that passes at r² with these cosines."""
     share = f[6]
@@ -96,7 +91,31 @@ def share_of(a, f, square, arriving, leaving):  # type: ignore[no-untyped-def]
     return share
 
 
-@_outer
+@ray_inlined
+def met_by(a, f, x, y, s, t):  # type: ignore[no-untyped-def]
+    """Where a ray meets the surface, with the normal and the cosines there.
+
+    Returns:
+        (far, l, m, n) of `met_at`; the point; (r², 2·∂z/∂r², root of the conic); the normal; the cosines of the
+        arriving and of the leaving ray, and the square of the latter, not above 0 for total reflection.
+    """
+    x, y = x + f[0] * s, y + f[0] * t
+    far, l, m, along = met_at(a, f, x, y, s, t)
+    px, py, pz = x + far * l, y + far * m, far * along
+    square = px * px + py * py
+    _, steep, root = sag_of(f[1], f[2], a, f, square)
+    steep *= 2.0
+    nz = 1.0 / math.sqrt(1.0 + steep * steep * square)
+    nx, ny = -steep * px * nz, -steep * py * nz
+    arriving = l * nx + m * ny + along * nz
+    rest = 1.0 - f[3] * f[3] * (1.0 - arriving * arriving)
+    leaving = math.sqrt(max(rest, 0.0))
+    return (
+        (far, l, m, along), (px, py, pz), (square, steep, root), (nx, ny, nz), (arriving, leaving, rest),
+    )  # fmt: skip
+
+
+@ray_loop
 def through_surface(a, f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
     """Step 13: refract a packet by any surface; rays that do not pass get the share 0, on the axis."""
     if a[0] == 0 and a[1] == 0 and f[2] == 0.0 and f[5] == 0.0:
@@ -104,17 +123,8 @@ def through_surface(a, f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
         return
     ratio = f[3]
     for p in range(n):
-        x0, y0 = x[p] + f[0] * s[p], y[p] + f[0] * t[p]
-        far, l, m, along = met_at(a, f, x0, y0, s[p], t[p])
-        px, py, pz = x0 + far * l, y0 + far * m, far * along
-        square = px * px + py * py
-        _, steep, _ = sag_of(f[1], f[2], a, f, square)
-        steep *= 2.0
-        nz = 1.0 / math.sqrt(1.0 + steep * steep * square)
-        nx, ny = -steep * px * nz, -steep * py * nz
-        arriving = l * nx + m * ny + along * nz
-        rest = 1.0 - ratio * ratio * (1.0 - arriving * arriving)
-        leaving = math.sqrt(max(rest, 0.0))
+        direction, (px, py, pz), shape, (nx, ny, nz), cosines = met_by(a, f, x[p], y[p], s[p], t[p])
+        (_, l, m, along), (square, _, _), (arriving, leaving, rest) = direction, shape, cosines
         bend = leaving - ratio * arriving
         on = ratio * along + bend * nz
         l, m = (ratio * l + bend * nx) / on, (ratio * m + bend * ny) / on
@@ -126,7 +136,7 @@ def through_surface(a, f, n, x, y, s, t, share):  # type: ignore[no-untyped-def]
             x[p] = y[p] = s[p] = t[p] = share[p] = 0.0
 
 
-@_back
+@ray_back
 def surface_back(a, f, n, before, bar, own):  # type: ignore[no-untyped-def]
     """Turn cotangents behind a surface into those before it, in place; add gradients of its numbers to ``own``.
 
@@ -136,17 +146,8 @@ def surface_back(a, f, n, before, bar, own):  # type: ignore[no-untyped-def]
     c, conic, ratio = f[1], f[2], f[3]
     for p in range(n):
         s0, t0 = before[2, p], before[3, p]
-        x0, y0 = before[0, p] + f[0] * s0, before[1, p] + f[0] * t0
-        far, l, m, along = met_at(a, f, x0, y0, s0, t0)
-        px, py, pz = x0 + far * l, y0 + far * m, far * along
-        square = px * px + py * py
-        _, steep, root = sag_of(c, conic, a, f, square)
-        steep *= 2.0
-        nz = 1.0 / math.sqrt(1.0 + steep * steep * square)
-        nx, ny = -steep * px * nz, -steep * py * nz
-        arriving = l * nx + m * ny + along * nz
-        rest = 1.0 - ratio * ratio * (1.0 - arriving * arriving)
-        leaving = math.sqrt(max(rest, 0.0))
+        direction, (px, py, pz), shape, (nx, ny, nz), cosines = met_by(a, f, before[0, p], before[1, p], s0, t0)
+        (far, l, m, along), (square, steep, root), (arriving, leaving, rest) = direction, shape, cosines
         passed = share_of(a, f, square, arriving, leaving)
         if not (passed > 0.0 and rest > 0.0 and arriving > 0.0):
             for q in range(5):

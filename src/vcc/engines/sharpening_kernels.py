@@ -5,18 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from vcc.base.workers import Workers
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import ordered_loop
+from vcc.engines.vector_sums import fetch_close
 from vcc.plan.how import cores
 from vcc.plan.operators import KEPT_DIGITS, REACH
 from vcc.plan.operators import WEIGHT_DIGITS as DIGITS
 
-_compiled = compiled(fastmath={"contract", "nsz"})
+LINE = 64
+"""Bytes of a cache line."""
 SHIFT = 2 * DIGITS - KEPT_DIGITS
 AT_ONCE = 32
 """Numbers that vectorised loops process at a time: multiples of it leave no remainder loop."""
@@ -163,7 +162,7 @@ def given_back(
     return found
 
 
-@_compiled
+@ordered_loop
 def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  # type: ignore[no-untyped-def]
     """Filter a part of each view along both axes.
 
@@ -204,7 +203,7 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
             if others is not None and i + 1 < nu:  # the same row of the next part, elsewhere in memory
                 place = ((part + 1) * rows + r) * row + max(first_columns[i + 1] - REACH, 0) * channels
                 for q in range(place, place + inner + per_line, per_line):
-                    prefetch(others, q)
+                    fetch_close(others, q)
             # Beyond a border, its last samples are repeated.
             lowest = min(r + 2, rows - 1)
             above2, above, level = view[max(r - 2, 0)], view[max(r - 1, 0)], view[r]
@@ -232,7 +231,7 @@ def sharpen(views, others, begin, size, kept, channels, weights, whole, line):  
                     to[q] = np.int32(total + half) >> SHIFT
 
 
-@_compiled
+@ordered_loop
 def give_back(view, found, channels, weights):  # type: ignore[no-untyped-def]
     """The transpose of `sharpen`, for real numbers.
 
@@ -270,27 +269,3 @@ def give_back(view, found, channels, weights):  # type: ignore[no-untyped-def]
         if r == rows - 1:
             for q in range(length):
                 found[r, q] += (near + far) * level[q] + far * above[q]
-
-
-# --- prefetching, for loops that would wait for memory ---
-
-
-LINE = 64
-"""Bytes of a cache line."""
-
-
-@intrinsic
-def prefetch(typing_context, values, at):  # type: ignore[no-untyped-def]
-    """Prefetch the cache line of an element of a contiguous array; the index may be out of bounds."""
-
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        place = builder.bitcast(builder.gep(data, [arguments[1]]), ir.IntType(8).as_pointer())
-        number = ir.IntType(32)
-        kind = ir.FunctionType(ir.VoidType(), [place.type, number, number, number])
-        function: Any = builder.module.declare_intrinsic("llvm.prefetch", [place.type], kind)
-        # read access, all cache levels, data
-        builder.call(function, [place, *(ir.Constant(number, n) for n in (0, 3, 1))])
-        return context.get_dummy_value()
-
-    return types.void(values, types.int64), generate

@@ -14,6 +14,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from vcc.engines.vector_sums import FLAGS, NUMBER, data_of, everywhere, plus, samples_at
+
 LANES = 8
 """Numbers in a sum: first the channels of the left pixel, then those of the right one."""
 
@@ -46,39 +48,19 @@ def _add_views(channels: int) -> Any:
         signature = types.void(values, types.UniTuple(place, 4), place, weights, weights, sums, place)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-            kept = context.make_array(signature.args[5])(context, builder, arguments[5]).data
+            data, kept = (data_of(context, builder, signature, arguments, n) for n in (0, 5))
             corners, rows, columns = (cgutils.unpack_tuple(builder, arguments[n]) for n in (1, 3, 4))
-            line = arguments[2]
-            number = ir.IntType(32)
-            wide = ir.VectorType(ir.FloatType(), lanes)
-            sample = context.get_value_type(values.dtype)
+            line, wide = arguments[2], ir.VectorType(ir.FloatType(), lanes)
 
-            def everywhere(scalar: Any) -> Any:
-                first = builder.insert_element(ir.Constant(wide, ir.Undefined), scalar, ir.Constant(number, 0))
-                return builder.shuffle_vector(
-                    first, ir.Constant(wide, ir.Undefined), ir.Constant(ir.VectorType(number, lanes), [0] * lanes)
+            def weighed(total: Any, weight: Any, offset: Any) -> Any:
+                run = samples_at(context, builder, builder.gep(data, [offset]), values.dtype, lanes)
+                return (
+                    builder.fmul(weight, run, flags=FLAGS) if total is None else plus(builder, total, weight, run)
                 )
 
-            def run_at(offset: Any) -> Any:
-                run = builder.bitcast(builder.gep(data, [offset]), ir.VectorType(sample, lanes).as_pointer())
-                run = builder.load(run, align=values.dtype.bitwidth // 8)
-                if isinstance(values.dtype, types.Integer):
-                    if values.dtype.signed:
-                        return builder.sitofp(run, wide)
-                    if values.dtype.bitwidth < 32:
-                        run = builder.zext(run, ir.VectorType(number, lanes))
-                        return builder.sitofp(run, wide)  # 32 bits with the sign bit clear: the cheap conversion
-                    return builder.uitofp(run, wide)
-                return builder.fptrunc(run, wide) if values.dtype.bitwidth == 64 else run
-
-            def plus(total: Any, weight: Any, run: Any) -> Any:
-                product = builder.fmul(weight, run, flags=["contract"])
-                return product if total is None else builder.fadd(total, product, flags=["contract"])
-
-            rows = [everywhere(weight) for weight in rows]
+            rows = [everywhere(builder, weight, lanes) for weight in rows]
             left_or_right = ir.Constant(
-                ir.VectorType(number, lanes),
+                ir.VectorType(NUMBER, lanes),
                 [lane if lane < channels else lanes + lane for lane in range(lanes)],
             )
             place = builder.bitcast(builder.gep(kept, [arguments[6]]), wide.as_pointer())
@@ -87,10 +69,10 @@ def _add_views(channels: int) -> Any:
                 found = None
                 for row in range(2):
                     offset = corners[2 * row + column]
-                    found = plus(found, rows[2 * row], run_at(offset))
-                    found = plus(found, rows[2 * row + 1], run_at(builder.add(offset, line)))
-                first, second = (everywhere(weight) for weight in columns[2 * column : 2 * column + 2])
-                total = plus(total, builder.shuffle_vector(first, second, left_or_right), found)
+                    found = weighed(found, rows[2 * row], offset)
+                    found = weighed(found, rows[2 * row + 1], builder.add(offset, line))
+                sides = (everywhere(builder, weight, lanes) for weight in columns[2 * column : 2 * column + 2])
+                total = plus(builder, total, builder.shuffle_vector(*sides, left_or_right), found)
             builder.store(total, place, align=4)
             return context.get_dummy_value()
 
@@ -134,18 +116,16 @@ def _spread_views(channels: int) -> Any:
         signature = types.void(values, types.UniTuple(place, 4), place, four, four, weights, place)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-            given = context.make_array(signature.args[5])(context, builder, arguments[5]).data
+            data, given = (data_of(context, builder, signature, arguments, n) for n in (0, 5))
             corners, rows, columns = (cgutils.unpack_tuple(builder, arguments[n]) for n in (1, 3, 4))
             line, pixel = arguments[2], arguments[6]
-            number = ir.IntType(32)
             wide = ir.VectorType(ir.FloatType(), lanes)
             kept = ir.VectorType(context.get_value_type(values.dtype), lanes)
 
             def lined_up(scalars: list[Any]) -> Any:
                 vector = ir.Constant(wide, ir.Undefined)
                 for lane, scalar in enumerate(scalars):
-                    vector = builder.insert_element(vector, scalar, ir.Constant(number, lane))
+                    vector = builder.insert_element(vector, scalar, ir.Constant(NUMBER, lane))
                 return vector
 
             carried = [
@@ -157,7 +137,7 @@ def _spread_views(channels: int) -> Any:
             def add_at(offset: Any, share: Any) -> None:
                 to = builder.bitcast(builder.gep(data, [offset]), kept.as_pointer())
                 share = builder.fpext(share, kept) if values.dtype.bitwidth == 64 else share
-                total = builder.fadd(builder.load(to, align=values.dtype.bitwidth // 8), share, flags=["contract"])
+                total = builder.fadd(builder.load(to, align=values.dtype.bitwidth // 8), share, flags=FLAGS)
                 builder.store(total, to, align=values.dtype.bitwidth // 8)
 
             for column in range(2):
@@ -166,8 +146,8 @@ def _spread_views(channels: int) -> Any:
                 for row in range(2):
                     above = corners[2 * row + column]
                     upper, lower = (lined_up([weight] * lanes) for weight in rows[2 * row : 2 * row + 2])
-                    add_at(above, builder.fmul(upper, across, flags=["contract"]))
-                    add_at(builder.add(above, line), builder.fmul(lower, across, flags=["contract"]))
+                    add_at(above, builder.fmul(upper, across, flags=FLAGS))
+                    add_at(builder.add(above, line), builder.fmul(lower, across, flags=FLAGS))
             return context.get_dummy_value()
 
         return signature, generate

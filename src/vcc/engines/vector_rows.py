@@ -19,27 +19,20 @@ from vcc.engines.vector_sums import (
     LANES,
     NUMBER,
     PLACE,
-    WIDE,
     constant,
+    data_of,
     everywhere,
     floats,
+    keep,
     parted,
     plus,
     samples_at,
+    zeros,
 )
-
-
-def _data(context: Any, builder: Any, signature: Any, arguments: Any, number: int) -> Any:
-    return context.make_array(signature.args[number])(context, builder, arguments[number]).data
 
 
 def _run(builder: Any, data: Any, place: Any) -> Any:
     return floats(builder, builder.gep(data, [place]))
-
-
-def _keep(builder: Any, values: Any, data: Any, place: Any) -> None:
-    pointer = builder.bitcast(builder.gep(data, [place]), WIDE.as_pointer())
-    builder.store(values, pointer, align=4)
 
 
 def _along(builder: Any, start: Any, length: Any, step: int, body: Callable[[Any], None]) -> None:
@@ -71,7 +64,7 @@ def _four_rows(fresh: bool, last: bool = False, channels: int = 1) -> Any:
         signature = types.void(planes, place_kind, place_kind, four, values, place_kind, place_kind, out)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            rows, samples, to = (_data(context, builder, signature, arguments, n) for n in (0, 4, 7))
+            rows, samples, to = (data_of(context, builder, signature, arguments, n) for n in (0, 4, 7))
             _, begin, step, shares, _, at, length, _ = arguments
             counts = [everywhere(builder, each) for each in cgutils.unpack_tuple(builder, shares)]
             begins = [builder.add(begin, builder.mul(constant(t), step)) for t in range(4)]
@@ -94,9 +87,9 @@ def _four_rows(fresh: bool, last: bool = False, channels: int = 1) -> Any:
                 if channels == 3:
                     one, two, three = parted(builder, runs)
                     both = builder.fadd(one, two, flags=FLAGS)
-                    _keep(builder, builder.fadd(both, three, flags=FLAGS), to, builder.udiv(x, constant(3)))
+                    keep(builder, builder.fadd(both, three, flags=FLAGS), to, builder.udiv(x, constant(3)))
                 else:
-                    _keep(builder, runs[0], to, x)
+                    keep(builder, runs[0], to, x)
 
             _along(builder, constant(0), length, channels * LANES, mix)
             return context.get_dummy_value()
@@ -120,13 +113,11 @@ def four_dots(typing_context, values, planes, place, step, length):  # type: ign
     signature = types.UniTuple(types.float32, 4)(values, planes, types.int64, types.int64, types.int64)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        run, rows = (_data(context, builder, signature, arguments, n) for n in (0, 1))
+        run, rows = (data_of(context, builder, signature, arguments, n) for n in (0, 1))
         _, _, begin, step, length = arguments
         begins = [builder.add(begin, builder.mul(constant(t), step)) for t in range(4)]
         # Two vectors at a time: each addition to a sum waits for the one before it.
-        totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(4)] for _ in range(2)]
-        for total in (total for pair in totals for total in pair):
-            builder.store(ir.Constant(WIDE, [0.0] * LANES), total)
+        totals = zeros(builder, 2, 4)
 
         def add(vectors: int) -> Callable[[Any], None]:
             def dots(x: Any) -> None:
@@ -178,7 +169,7 @@ def _weighed(repeat: int) -> Any:
         signature = types.void(values, types.int64, weights, types.int64, out)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            samples, light, to = (_data(context, builder, signature, arguments, n) for n in (0, 2, 4))
+            samples, light, to = (data_of(context, builder, signature, arguments, n) for n in (0, 2, 4))
             _, at, _, length, _ = arguments
 
             def weigh(k: Any) -> None:
@@ -190,7 +181,7 @@ def _weighed(repeat: int) -> Any:
                     weight = builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(NUMBER, LANES), index))
                     place = builder.gep(samples, [builder.add(at, here)])
                     sample = samples_at(context, builder, place, signature.args[0].dtype)
-                    _keep(builder, builder.fmul(sample, weight, flags=FLAGS), to, here)
+                    keep(builder, builder.fmul(sample, weight, flags=FLAGS), to, here)
 
             _along(builder, constant(0), length, LANES, weigh)
             return context.get_dummy_value()
@@ -212,7 +203,7 @@ def to_three_rows(typing_context, values, shares, places, length, out):  # type:
     )
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        run, to = (_data(context, builder, signature, arguments, n) for n in (0, 4))
+        run, to = (data_of(context, builder, signature, arguments, n) for n in (0, 4))
         counts = [everywhere(builder, each) for each in cgutils.unpack_tuple(builder, arguments[1])]
         begins = cgutils.unpack_tuple(builder, arguments[2])
 
@@ -220,7 +211,7 @@ def to_three_rows(typing_context, values, shares, places, length, out):  # type:
             value = _run(builder, run, x)
             for count, begin in zip(counts, begins, strict=True):
                 here = builder.add(begin, x)
-                _keep(builder, plus(builder, _run(builder, to, here), count, value), to, here)
+                keep(builder, plus(builder, _run(builder, to, here), count, value), to, here)
 
         _along(builder, constant(0), arguments[3], LANES, give)
         return context.get_dummy_value()

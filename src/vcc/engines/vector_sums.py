@@ -57,6 +57,11 @@ def aligned_buffer(*shape: int) -> NDArray[np.float32]:
     return wide[start : start + size].reshape(shape)
 
 
+def data_of(context: Any, builder: Any, signature: Any, arguments: Any, number: int) -> Any:
+    """The data of an argument that is an array."""
+    return context.make_array(signature.args[number])(context, builder, arguments[number]).data
+
+
 def constant(number: int) -> Any:
     """An offset or a count as a constant."""
     return ir.Constant(PLACE, number)
@@ -74,20 +79,46 @@ def floats(builder: Any, pointer: Any, lanes: int = LANES) -> Any:
     return builder.load(builder.bitcast(pointer, ir.VectorType(ir.FloatType(), lanes).as_pointer()), align=4)
 
 
-def samples_at(context: Any, builder: Any, pointer: Any, kind: Any) -> Any:
+def samples_at(context: Any, builder: Any, pointer: Any, kind: Any, lanes: int = LANES) -> Any:
     """Load a vector of samples of any type from memory, as float32."""
-    run = ir.VectorType(context.get_value_type(kind), LANES).as_pointer()
-    samples = builder.load(builder.bitcast(pointer, run), align=kind.bitwidth // 8)
+    run, wide = ir.VectorType(context.get_value_type(kind), lanes), ir.VectorType(ir.FloatType(), lanes)
+    samples = builder.load(builder.bitcast(pointer, run.as_pointer()), align=kind.bitwidth // 8)
     if isinstance(kind, types.Integer):
+        if kind.signed:
+            return builder.sitofp(samples, wide)
         if kind.bitwidth < 32:  # with the sign bit clear: the cheap conversion
-            return builder.sitofp(builder.zext(samples, ir.VectorType(NUMBER, LANES)), WIDE)
-        return builder.uitofp(samples, WIDE)
-    return builder.fptrunc(samples, WIDE) if kind.bitwidth == 64 else samples
+            return builder.sitofp(builder.zext(samples, ir.VectorType(NUMBER, lanes)), wide)
+        return builder.uitofp(samples, wide)
+    return builder.fptrunc(samples, wide) if kind.bitwidth == 64 else samples
 
 
 def plus(builder: Any, total: Any, weight: Any, values: Any) -> Any:
     """total + weight · values."""
     return builder.fadd(total, builder.fmul(weight, values, flags=FLAGS), flags=FLAGS)
+
+
+def keep(builder: Any, vector: Any, data: Any, place: Any) -> None:
+    """Store a vector of float32 in memory."""
+    builder.store(vector, builder.bitcast(builder.gep(data, [place]), WIDE.as_pointer()), align=4)
+
+
+def zeros(builder: Any, rows: int, vectors: int) -> list[list[Any]]:
+    """Rows of vectors that sums are kept in, 0 to begin with."""
+    totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(rows)]
+    for total in (total for row in totals for total in row):
+        builder.store(ir.Constant(WIDE, [0.0] * LANES), total)
+    return totals
+
+
+def add_behind(builder: Any, vectors: Sequence[Any], out: Any, begin: Any, skipped: Any) -> None:
+    """out[begin …] += vectors, except for the first ``skipped`` values."""
+    skipped = everywhere(builder, skipped)
+    for k, vector in enumerate(vectors):
+        place = builder.add(begin, constant(k * LANES))
+        lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
+        dark = ir.Constant(WIDE, [0.0] * LANES)
+        fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), vector, dark)
+        keep(builder, builder.fadd(floats(builder, builder.gep(out, [place])), fresh, flags=FLAGS), out, place)
 
 
 class _Masks:
@@ -180,16 +211,9 @@ def _add_rows(
     values, entries, _, x, skip, sums, line = arguments
     totals = _totals(context, builder, signature, (values, entries, x), vectors, masks)
     sums, pitch = _plane(context, builder, signature.args[5], sums)
-    dark = ir.Constant(WIDE, [0.0] * LANES)
-    skipped = everywhere(builder, skip)
-    for row in range(ROWS):
+    for row, total in enumerate(totals):
         begin = builder.add(builder.mul(builder.add(line, constant(row)), pitch), x)
-        for k in range(vectors):
-            pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
-            lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
-            fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), totals[row][k], dark)
-            here = builder.bitcast(pointer, WIDE.as_pointer())
-            builder.store(builder.fadd(builder.load(here, align=4), fresh, flags=FLAGS), here, align=4)
+        add_behind(builder, total, sums, begin, skip)
     return context.get_dummy_value()
 
 
@@ -209,10 +233,7 @@ def _totals(
     values, entries, x = arguments
     values = context.make_array(signature.args[0])(context, builder, values).data
     order, ends, places, shares = (each.data for each in _arrays(context, builder, signature.args[1], entries))
-    dark = ir.Constant(WIDE, [0.0] * LANES)
-    totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(ROWS)]
-    for total in (total for row in totals for total in row):
-        builder.store(dark, total)
+    totals = zeros(builder, ROWS, vectors)
     start = constant(0)
     for number, (upper, lower) in enumerate(RANGES):
         stop = builder.load(builder.gep(ends, [constant(number)]))
@@ -272,8 +293,7 @@ def _whole_rows(vectors: int, repeat: int | None = None, apart: bool = False) ->
                     written = parted(builder, total) if apart else total
                     begin = builder.add(builder.add(to, builder.mul(constant(row), pitch)), x if apart else here)
                     for k, each in enumerate(written):
-                        pointer = builder.gep(sums, [builder.add(begin, constant(k * LANES))])
-                        builder.store(each, builder.bitcast(pointer, WIDE.as_pointer()), align=4)
+                        keep(builder, each, sums, builder.add(begin, constant(k * LANES)))
             return context.get_dummy_value()
 
         return signature, generate
@@ -311,22 +331,30 @@ part_whole_rows = _whole_rows(3, apart=True)
 part_masked_whole_rows = _whole_rows(3, repeat=3, apart=True)
 
 
-@intrinsic
-def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
-    """Prefetch the cache line of ``values[place]``; the place may be out of bounds."""
-    signature = types.void(values, types.int64)
+def _fetching(locality: int) -> Any:
+    @intrinsic
+    def fetch(typing_context, values, place):  # type: ignore[no-untyped-def]
+        """Prefetch the cache line of ``values[place]``; the place may be out of bounds."""
+        signature = types.void(values, types.int64)
 
-    def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        byte = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.VoidType(), [byte, NUMBER, NUMBER, NUMBER])
-        prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
-        # read access, second-level cache, data
-        hints = [ir.Constant(NUMBER, hint) for hint in (0, 2, 1)]
-        builder.call(prefetch, [builder.bitcast(builder.gep(data, [arguments[1]]), byte), *hints])
-        return context.get_dummy_value()
+        def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            data = data_of(context, builder, signature, arguments, 0)
+            byte = ir.IntType(8).as_pointer()
+            kind = ir.FunctionType(ir.VoidType(), [byte, NUMBER, NUMBER, NUMBER])
+            prefetch = builder.module.declare_intrinsic("llvm.prefetch", [byte], kind)
+            hints = [ir.Constant(NUMBER, hint) for hint in (0, locality, 1)]  # read access; data
+            builder.call(prefetch, [builder.bitcast(builder.gep(data, [arguments[1]]), byte), *hints])
+            return context.get_dummy_value()
 
-    return signature, generate
+        return signature, generate
+
+    return fetch
+
+
+fetch = _fetching(2)
+"""Into the second-level cache."""
+fetch_close = _fetching(3)
+"""Into all levels of the cache."""
 
 
 EIGHT = 8
@@ -350,20 +378,18 @@ def mix_eight(typing_context, sums, place, step, shares, row, out, to):  # type:
     signature = types.void(sums, types.int64, types.int64, shares, types.int64, out, types.int64)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        sums, shares, out = (
-            context.make_array(signature.args[n])(context, builder, arguments[n]) for n in (0, 3, 5)
-        )
+        sums, out = (data_of(context, builder, signature, arguments, n) for n in (0, 5))
         place, step, row, to = (arguments[n] for n in (1, 2, 4, 6))
-        width = cgutils.unpack_tuple(builder, shares.shape)[1]
+        shares, width = _plane(context, builder, signature.args[3], arguments[3])
         wide = ir.VectorType(ir.FloatType(), EIGHT)
-        here = builder.bitcast(builder.gep(out.data, [to]), wide.as_pointer())
+        here = builder.bitcast(builder.gep(out, [to]), wide.as_pointer())
         total = cgutils.alloca_once(builder, wide)
         builder.store(builder.load(here, align=4), total)
-        first = builder.gep(shares.data, [builder.mul(row, width)])
+        first = builder.gep(shares, [builder.mul(row, width)])
         with cgutils.for_range(builder, width, intp=PLACE) as loop:
             share = everywhere(builder, builder.load(builder.gep(first, [loop.index])), EIGHT)
             begin = builder.add(place, builder.mul(loop.index, step))
-            run = floats(builder, builder.gep(sums.data, [begin]), EIGHT)
+            run = floats(builder, builder.gep(sums, [begin]), EIGHT)
             builder.store(plus(builder, builder.load(total), share, run), total)
         builder.store(builder.load(total), here, align=4)
         return context.get_dummy_value()

@@ -5,12 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from vcc.engines.vector_sums import FLAGS, LANES, PLACE, VECTORS, WIDE, constant, everywhere, floats, joined, plus
+from vcc.engines.vector_sums import (
+    LANES,
+    PLACE,
+    VECTORS,
+    add_behind,
+    constant,
+    data_of,
+    floats,
+    joined,
+    plus,
+    zeros,
+)
 
 MASKS = 4
 """Number of masks that weigh sums together."""
@@ -44,9 +54,7 @@ def _weigher(vectors: int, parted: bool) -> Any:
         signature = types.void(sums, whole, whole, lines, whole, whole, whole, out, whole, whole, whole)
 
         def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            sums, lines, out = (
-                context.make_array(signature.args[n])(context, builder, arguments[n]).data for n in (0, 3, 7)
-            )
+            sums, lines, out = (data_of(context, builder, signature, arguments, n) for n in (0, 3, 7))
             _, pitch, count, _, at, line, plane, _, to, step, length = arguments
             last = builder.sub(length, constant(run))
             with cgutils.for_range_slice(builder, constant(0), length, constant(run), PLACE) as (x, _):
@@ -56,7 +64,7 @@ def _weigher(vectors: int, parted: bool) -> Any:
                 skipped = builder.sub(x, here)
                 for n, total in enumerate(_weighed(builder, *rows, vectors, parted)):
                     begin = builder.add(builder.add(to, builder.mul(constant(n), step)), here)
-                    _add_behind(builder, joined(builder, total) if parted else total, out, begin, skipped)
+                    add_behind(builder, joined(builder, total) if parted else total, out, begin, skipped)
             return context.get_dummy_value()
 
         return signature, generate
@@ -74,9 +82,7 @@ def _weighed(
     """
     sums, place, pitch, count = of_sums
     lines, at, line, plane = of_lines
-    totals = [[cgutils.alloca_once(builder, WIDE) for _ in range(vectors)] for _ in range(MASKS)]
-    for total in (total for mask in totals for total in mask):
-        builder.store(ir.Constant(WIDE, [0.0] * LANES), total)
+    totals = zeros(builder, MASKS, vectors)
     with cgutils.for_range(builder, count, intp=PLACE) as loop:
         begin = builder.add(place, builder.mul(loop.index, pitch))
         places = [builder.add(begin, constant(k * LANES)) for k in range(vectors)]
@@ -91,18 +97,6 @@ def _weighed(
                 total = totals[n][k]
                 builder.store(plus(builder, builder.load(total), weights[k % different], value), total)
     return [[builder.load(total) for total in mask] for mask in totals]
-
-
-def _add_behind(builder: Any, vectors: Sequence[Any], out: Any, begin: Any, skipped: Any) -> None:
-    """out[begin …] += vectors, except for the first ``skipped`` values."""
-    skipped = everywhere(builder, skipped)
-    for k, vector in enumerate(vectors):
-        pointer = builder.gep(out, [builder.add(begin, constant(k * LANES))])
-        pointer = builder.bitcast(pointer, WIDE.as_pointer())
-        lanes = ir.Constant(ir.VectorType(PLACE, LANES), [k * LANES + lane for lane in range(LANES)])
-        dark = ir.Constant(WIDE, [0.0] * LANES)
-        fresh = builder.select(builder.icmp_signed(">=", lanes, skipped), vector, dark)
-        builder.store(builder.fadd(builder.load(pointer, align=4), fresh, flags=FLAGS), pointer, align=4)
 
 
 weigh_rows = _weigher(VECTORS, parted=False)

@@ -131,13 +131,13 @@ def read_tables(path: str | PathLike[str]) -> dict[str, Any]:
         return _read_toml(file)
 
 
-def tables_of_text(text: str, called: str = "the camera") -> dict[str, Any]:
+def tables_of_text(text: str) -> dict[str, Any]:
     """Return the tables of a camera file from its text.
 
     Raises:
         InputError: not TOML.
     """
-    return _parsed(text, called)
+    return _parsed(text, "the camera")
 
 
 def train_of_tables(

@@ -17,10 +17,10 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.aberrations import Aberrations
-from vcc.optics.faces import Element, Faces, Part
+from vcc.optics.faces import Faces, Part
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.ray_map import Fit, fits
-from vcc.optics.real_lens import RADIOMETRIES, RealLens, Seen
+from vcc.optics.real_lens import RADIOMETRIES, Seen, TracedLens
 from vcc.shapes.patterns import Circle
 
 Array = NDArray[np.float64]
@@ -131,7 +131,7 @@ class RayTable(Brief, Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RayTableLens(Brief, Value, Element):
+class RayTableLens(Brief, Value, TracedLens):
     """A lens known by a table of rays, without its surfaces (Goossens et al. 2022, Optics Express 30, 24031).
 
     Its map of rays is a polynomial with rotational symmetry; see `RayTable`. Aberrations, distortion, vignetting
@@ -170,20 +170,6 @@ class RayTableLens(Brief, Value, Element):
         return FirstOrder(self.table.matrix, self.length, z=self.z, decentre=self.decentre, name=self.name)
 
     @property
-    def focal_length(self) -> float:
-        """By rays next to the axis, metres."""
-        return self.first_order.focal_length
-
-    def image_distance(self, object_distance: float) -> float:
-        """From the second plane to the image by rays next to the axis; see `vcc.FirstOrder.image_distance`."""
-        return self.first_order.image_distance(object_distance)
-
-    @property
-    def focus_z(self) -> float:
-        """Place on the axis of the first-order image of a distant scene, metres."""
-        return self.z + self.length + self.image_distance(math.inf)
-
-    @property
     def half_size(self) -> float:
         """Largest distance of the table's rays from the axis in its two planes, metres."""
         return float(np.hypot(self.table.rays[:, [0, 4]], self.table.rays[:, [1, 5]]).max())
@@ -205,20 +191,11 @@ class RayTableLens(Brief, Value, Element):
         flight = Affine.propagation(back.distance)
         return (flight, Faces(transmission=Circle(2 * back.radius)), flight.inverse())
 
-    def faces(self) -> Faces:
-        """No faces: the effect of a thick element is between its planes; see `parts`."""
-        return Faces()
-
     def described(self) -> str:
         """Focal length, and the map and how well it is known, as text."""
         words = [f"focal length {short(self.focal_length)}"] if math.isfinite(self.focal_length) else []
-        words += [self.table.described(), f"{self.radiometry} radiometry"]
-        return ", ".join([*words, f"from {self.source}"] if self.source else words)
+        return self._in_words(*words, self.table.described())
 
 
 def _warn(words: str) -> None:
     warnings.warn(words, ResultWarning, stacklevel=4)
-
-
-TRACED = RealLens | RayTableLens
-"""Lenses with all their aberrations."""

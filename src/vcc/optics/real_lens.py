@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, get_args
@@ -34,8 +35,51 @@ FARTHEST = 100.0
 """An exit pupil farther away than this many lengths of the lens is replaced by the plane behind the lens."""
 
 
+class TracedLens(Element):
+    """A lens with all its aberrations: rays through it are traced, and its first order is a part of it."""
+
+    radiometry: str
+    source: str
+
+    @property
+    @abstractmethod
+    def first_order(self) -> FirstOrder:
+        """The lens without aberrations: focal length, principal planes, image distance."""
+
+    @abstractmethod
+    def window(self, seen: Seen | None) -> tuple[Part, ...]:
+        """A disc behind the lens that all light passes on its way to the sensor: rays are aimed at it.
+
+        Args:
+            seen: how the sensor sees the end of the lens; None if this is not known in first order.
+        """
+
+    @property
+    def focal_length(self) -> float:
+        """By the first order, metres."""
+        return self.first_order.focal_length
+
+    def image_distance(self, object_distance: float) -> float:
+        """From the end of the element to the first-order image; see `vcc.FirstOrder.image_distance`."""
+        return self.first_order.image_distance(object_distance)
+
+    @property
+    def focus_z(self) -> float:
+        """Place on the axis of the first-order image of a distant scene, metres."""
+        return self.z + self.length + self.image_distance(math.inf)
+
+    def faces(self) -> Faces:
+        """No faces: the effect of a thick element is between its planes; see `parts`."""
+        return Faces()
+
+    def _in_words(self, *words: str) -> str:
+        """What describes the lens, its radiometry and its source, as text."""
+        listed = [*words, f"{self.radiometry} radiometry"]
+        return ", ".join([*listed, f"from {self.source}"] if self.source else listed)
+
+
 @dataclass(frozen=True)
-class RealLens(Element):
+class RealLens(TracedLens):
     """A lens with all its aberrations, vignetting and colour: each ray is refracted by each surface.
 
     Refraction follows Snell's law without approximation, so the lens is exact within geometric optics; light
@@ -169,23 +213,9 @@ class RealLens(Element):
         return self.length - (self.front + self.prescription.length)
 
     @property
-    def focal_length(self) -> float:
-        """By the first order, metres."""
-        return self.first_order.focal_length
-
-    @property
     def f_number(self) -> float:
         """By the first order, for a distant scene."""
         return self.first_order.f_number
-
-    def image_distance(self, object_distance: float) -> float:
-        """From the end of the element to the first-order image; see `vcc.FirstOrder.image_distance`."""
-        return self.first_order.image_distance(object_distance)
-
-    @property
-    def focus_z(self) -> float:
-        """Place on the axis of the first-order image of a distant scene, metres."""
-        return self.z + self.length + self.image_distance(math.inf)
 
     # --- surfaces
 
@@ -265,10 +295,6 @@ class RealLens(Element):
         disc = Faces(transmission=Circle(2 * radius))
         flight = Affine.propagation(distance)
         return (flight, disc, flight.inverse())
-
-    def faces(self) -> Faces:
-        """No faces: the effect of a thick element is between its planes; see `parts`."""
-        return Faces()
 
     @property
     @cached
@@ -435,8 +461,7 @@ class RealLens(Element):
         words += [f"{open_ones} surfaces without a clear diameter"] if open_ones else []
         words += ["a mask at its stop"] if self.mask is not None else []
         words += ["dispersion"] if self.depends_on_band else []
-        words += [f"{self.radiometry} radiometry"]
-        return ", ".join([*words, f"from {self.source}"] if self.source else words)
+        return self._in_words(*words)
 
 
 @dataclass(frozen=True)

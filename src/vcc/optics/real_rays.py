@@ -24,8 +24,8 @@ from vcc.optics.band import Band
 from vcc.optics.bands import single_way
 from vcc.optics.faces import Faces
 from vcc.optics.ray_map import RayMap
-from vcc.optics.ray_table import TRACED, RayTableLens
-from vcc.optics.real_lens import RealLens
+from vcc.optics.ray_table import RayTableLens
+from vcc.optics.real_lens import RealLens, TracedLens
 from vcc.optics.refraction import Refraction, traced
 from vcc.optics.train import Stage, Train
 
@@ -135,7 +135,7 @@ def light_stages(train: Train) -> list[Stage]:
     found = list(train.stages)
     for number, stage in enumerate(found):
         last = number + 1 == len(found) or found[number + 1].element is not stage.element
-        if isinstance(stage.element, TRACED) and stage.faces.bending is None and last:
+        if isinstance(stage.element, TracedLens) and stage.faces.bending is None and last:
             found[number] = replace(stage, faces=Faces())
     return found
 

@@ -26,8 +26,7 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import Deflection
 from vcc.optics.faces import Element, Faces, Part
 from vcc.optics.pixels import Microlens, PixelTransmission, SlopesOfChief, photodiode_term
-from vcc.optics.ray_table import TRACED, RayTableLens
-from vcc.optics.real_lens import RealLens, Seen
+from vcc.optics.real_lens import Seen, TracedLens
 from vcc.optics.sensor import Sensor
 from vcc.optics.terms import Term
 from vcc.shapes.patterns import owned
@@ -317,10 +316,11 @@ class Train(Value, Shown):
         stages: list[Stage] = []
         approach, here, leaving = Affine.identity(), 0.0, Affine.identity()
         for element, parts in (*self.met, *met_in_order(self._pixels)):
-            if isinstance(element, TRACED):
+            if isinstance(element, TracedLens):
                 behind = self._behind(element)
-                if any(isinstance(later, TRACED) for later in behind):
-                    parts = replace(element, radiometry="paraxial").parts()  # the last lens weighs light by angle
+                if any(isinstance(later, TracedLens) for later in behind):
+                    # the last lens weighs light by angle
+                    parts = replace(element, radiometry="paraxial").parts()  # type: ignore[call-arg]
                 parts = (*parts, *element.window(self.seen_from_sensor(element)))
             approach = Affine.propagation(_distance(here, element.z)) @ approach
             here = element.z
@@ -352,7 +352,7 @@ class Train(Value, Shown):
         number = next(n for n, each in enumerate(self.elements) if each is element)
         return self.elements[number + 1 :]
 
-    def seen_from_sensor(self, lens: RealLens | RayTableLens) -> Seen | None:
+    def seen_from_sensor(self, lens: TracedLens) -> Seen | None:
         """How the sensor sees the end of a real lens; None behind elements that are not affine or round."""
         behind = self._behind(lens)
         faces = [part for element in behind for part in element.parts() if isinstance(part, Faces)]

@@ -11,7 +11,7 @@ import numpy as np
 from vcc.base import checks
 from vcc.base.units import mm
 from vcc.optics import CellDeflection, Element, Faces, Louvre, RealLens
-from vcc.optics.ray_table import TRACED
+from vcc.optics.real_lens import TracedLens
 from vcc.optics.real_rays import entrance_box
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
@@ -96,7 +96,7 @@ def _part(element: Element, axis: int) -> tuple[float, int]:
 
 def _beam(element: Element, half: float, axis: int) -> float:
     """Half the height of the light, metres: that which a real lens lets pass, or that of the drawing."""
-    if not isinstance(element, TRACED):
+    if not isinstance(element, TracedLens):
         return half
     train = Train([element], Sensor(z=element.length, shape=(1, 1), pitch=1.0))
     return float(entrance_box(train, math.inf, np.zeros(2))[1][axis])

@@ -14,7 +14,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm, short
 from vcc.fields.samples import InMemory
 from vcc.optics import CellDeflection, Element, FirstOrder, Lens, RealLens
-from vcc.optics.ray_table import TRACED
+from vcc.optics.real_lens import TracedLens
 from vcc.optics.real_rays import entrance_box
 from vcc.optics.train import Stage, Train
 from vcc.plot.elements import half_size
@@ -189,7 +189,7 @@ def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: i
     """The range on the entrance plane that the rays of a point fill, metres."""
     if light_field is not None:
         return _through_views(point, light_field, axis)
-    if any(isinstance(element, TRACED) for element in camera.elements):
+    if any(isinstance(element, TracedLens) for element in camera.elements):
         field = np.zeros(2)
         field[axis] = point.offset
         try:

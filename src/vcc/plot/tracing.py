@@ -257,7 +257,7 @@ def openings(camera: Train, axis: int) -> Iterator[tuple[Element, Affine, float]
             yield stage.element, stage.arriving, stage.faces.pattern.size[axis] / 2
 
 
-def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: float = 0.0) -> Array:
+def fan(positions: ArrayLike, distance: float, offset: float, axis: int) -> Array:
     """Rays from a point of the scene through positions on the entrance plane.
 
     Args:
@@ -265,7 +265,6 @@ def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: 
         distance: of the point from the entrance plane, metres; infinite for parallel light.
         offset: of the point from the axis as a slope, X/Z.
         axis: 0 for x, 1 for y.
-        cross: position along the other axis, metres.
 
     Returns:
         (u, v, s, t) of each ray at z = 0, (rays, 4).
@@ -273,7 +272,6 @@ def fan(positions: ArrayLike, distance: float, offset: float, axis: int, cross: 
     positions = np.asarray(positions, dtype=np.float64)
     rays = np.zeros((len(positions), 4))
     rays[:, axis] = positions
-    rays[:, 1 - axis] = cross
     rays[:, 2:] = 0.0 if math.isinf(distance) else rays[:, :2] / distance
     rays[:, 2 + axis] -= offset
     return rays

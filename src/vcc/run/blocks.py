@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -160,10 +160,8 @@ def cut(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks
     Raises:
         InputError: a limit that does not fit a single row of pixels.
     """
-    _, _, nt, ns = grid.shape[:4]
-    rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
-    high, wide = rows[1] - rows[0], columns[1] - columns[0]
-    of = partial(Blocks, rows, columns, nt, ns)
+    nt = grid.shape[2]
+    of, high, wide = _of_views(used, grid)
     view, border = need.view, need.border
     spare = max(limit - need.fixed - need.reading, 0.0) / need.times
     if spare >= view * high * wide:  # a single block has no neighbours and needs no border
@@ -211,16 +209,21 @@ def cut_evenly(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) ->
 
 def _in_bands(used: NDArray[np.bool_], grid: Grid, need: Need, limit: float) -> Blocks | None:
     """The largest bands of pixel rows of all views that fit; None if all views fit, or if too many are needed."""
-    _, _, nt, ns = grid.shape[:4]
-    rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
-    high, wide = rows[1] - rows[0], columns[1] - columns[0]
+    nt = grid.shape[2]
+    of, high, wide = _of_views(used, grid)
     total, spare = high * wide * need.view, (limit - need.fixed - need.reading) / need.times
     if spare <= 0:
         return None
     each = int(spare / total * nt)
     if not 1 <= each < nt or math.ceil(nt / each) > need.bands:
         return None
-    return Blocks(rows, columns, nt, ns, high, wide, each)
+    return of(high, wide, each)
+
+
+def _of_views(used: NDArray[np.bool_], grid: Grid) -> tuple[Callable[[int, int, int], Blocks], int, int]:
+    """A function that makes blocks of the used views by size; the numbers of rows and of columns of views."""
+    rows, columns = _span(used.any(axis=1)), _span(used.any(axis=0))
+    return partial(Blocks, rows, columns, *grid.shape[2:4]), rows[1] - rows[0], columns[1] - columns[0]
 
 
 def _span(used: Any) -> tuple[int, int]:

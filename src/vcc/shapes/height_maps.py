@@ -141,10 +141,12 @@ def _coefficient_bound(spline: Any, half_width: float, half_height: float) -> fl
 class _Table(Sheet):
     """A surface with values at the middles of square or rectangular cells that fill its sheet."""
 
+    linear_in: ClassVar[str]
+
     @property
-    @abc.abstractmethod
     def _cells(self) -> Array:
         """The value of each cell, (rows, columns)."""
+        return np.asarray(getattr(self, self.linear_in))
 
     @property
     def factor(self) -> float:
@@ -202,8 +204,6 @@ class HeightMap(_Table):
 
     The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
-    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
-
     Args:
         heights: thickness of the glass, metres, (rows, columns), row 0 at the top; 4×4 or more.
         width: of the whole sheet, metres.
@@ -227,10 +227,6 @@ class HeightMap(_Table):
         _check_glass("a height map", self.refractive_index)
 
     @property
-    def _cells(self) -> Array:
-        return self.heights
-
-    @property
     def factor(self) -> float:
         """The optical path for 1 metre of glass: n − 1."""
         return self.refractive_index - 1
@@ -243,8 +239,6 @@ class HeightMap(_Table):
 @dataclass(frozen=True, eq=False, repr=False)
 class PathMap(_Table):
     """Optical path lengths sampled on a grid, from another program or a wavefront measurement.
-
-    The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
     The sheet is ``width`` wide and bounds a plate made of it; values are at the middles of its cells.
 
@@ -266,10 +260,6 @@ class PathMap(_Table):
     def __post_init__(self) -> None:
         object.__setattr__(self, "paths", _table("paths of a path map", self.paths))
         checks.sizes("a path map", width=self.width, height=self.height)
-
-    @property
-    def _cells(self) -> Array:
-        return self.paths
 
 
 @dataclass(frozen=True)

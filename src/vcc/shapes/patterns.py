@@ -140,7 +140,11 @@ def raster(centre: Array, length: float, bound: float, fewest: int) -> Raster | 
     extent = bound if math.isfinite(bound) else high - low
     while across > fewest and length > 0 and extent / length * across > RASTER_LIMIT:
         across //= 2
-    step = length / across
+    return points_between(low, high, length / across)
+
+
+def points_between(low: float, high: float, step: float) -> Raster | None:
+    """The points at odd multiples of half a step that cover a range, metres; None if they are too many."""
     if step <= 0 or (high - low) / step > LONGEST_RASTER:
         return None
     first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)

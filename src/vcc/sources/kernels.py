@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
-
-_FAST = {"contract", "reassoc", "nsz"}
-_compiled = compiled(fastmath=_FAST)
+from vcc.engines.compiled import fast_loop
 
 
-@_compiled
+@fast_loop
 def views_of_row(rasters, down, across, row, scale, top, out):  # type: ignore[no-untyped-def]
     """Fill one row of views: out[i, l, k, c], planes nearest first.
 

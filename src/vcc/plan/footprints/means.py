@@ -22,7 +22,6 @@ from vcc.shapes.lattice import CellApertures
 from vcc.shapes.mean_back import OnSheet, cells_back, tiles_back
 from vcc.shapes.patterns import (
     FEWEST_PER_CELL,
-    LONGEST_RASTER,
     RASTER_LIMIT,
     RASTER_PER_CELL,
     Bounded,
@@ -31,6 +30,7 @@ from vcc.shapes.patterns import (
     Raster,
     is_grid,
     overlap_share,
+    points_between,
 )
 from vcc.shapes.stacked_patterns import Product, Shifted
 
@@ -267,11 +267,7 @@ def _raster(centre: Array, length: float, bound: float) -> Raster | None:
     across = RASTER_PER_CELL
     while across > FEWEST_PER_CELL and length > 0 and (high - low) / length * across > RASTER_LIMIT:
         across //= 2
-    step = length / across
-    if step <= 0 or (high - low) / step > LONGEST_RASTER:
-        return None
-    first, last = math.floor(low / step), max(math.ceil(high / step), math.floor(low / step) + 1)
-    return Raster(np.asarray((np.arange(first, last) + 0.5) * step), first * step, last * step)
+    return points_between(low, high, length / across)
 
 
 # --- transpose of `mean_over`: from weights of a pattern's means to weights of the cells that it is made of ---

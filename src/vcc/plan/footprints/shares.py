@@ -73,20 +73,20 @@ def _outer(r: Any) -> Any:
     return r * (2 + r * (r * (5.0 / 6.0 - r / 8) - 2))  # powers by ** take many times as long
 
 
-def weight(interpolation: str, distance: Any, xp: Any = np) -> Any:
+def weight(interpolation: str, distance: Any) -> Any:
     """φ at a distance in samples: how values between samples are interpolated."""
-    r = xp.abs(distance)
+    r = np.abs(distance)
     if interpolation in ("nearest", "box"):
-        return xp.astype((distance >= -0.5) & (distance < 0.5), xp.float64)
+        return np.astype((distance >= -0.5) & (distance < 0.5), np.float64)
     if interpolation == "linear":
-        return xp.clip(1 - r, 0.0, 1.0)
+        return np.clip(1 - r, 0.0, 1.0)
     if interpolation == "spline":
-        inner = xp.clip(r, 0.0, 1.0)
-        left = xp.clip(2 - r, 0.0, 1.0)
-        return xp.where(r < 1, 2.0 / 3.0 + inner * inner * (inner / 2 - 1), left * left * left / 6)
+        inner = np.clip(r, 0.0, 1.0)
+        left = np.clip(2 - r, 0.0, 1.0)
+        return np.where(r < 1, 2.0 / 3.0 + inner * inner * (inner / 2 - 1), left * left * left / 6)
     near = (1.5 * r - 2.5) * r * r + 1
     far = ((-0.5 * r + 2.5) * r - 4) * r + 2
-    return xp.where(r < 1, near, xp.where(r < 2, far, xp.zeros_like(r)))
+    return np.where(r < 1, near, np.where(r < 2, far, np.zeros_like(r)))
 
 
 def shares(interpolation: str, pixel: Any, position: Any, step: float, opening: float = 1.0, xp: Any = np) -> Any:

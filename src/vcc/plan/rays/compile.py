@@ -49,6 +49,7 @@ from vcc.plan.rays.textures import (
     Enough,
     Function,
     Points,
+    Region,
     Sampled,
     at_points,
     choose_points,
@@ -320,12 +321,11 @@ class _Met:
 
     Args:
         stage: of the element.
-        region: lowest and highest (x, y) at which rays meet it, metres.
+        region: of it that rays meet.
         footprint: (width, height) in metres over which the rays of one pixel spread there; None if unknown.
         index_from_slope: (4, 2), samples of the light field by which a ray moves for a slope there; None if
             unknown.
         sizes: points a side of textures for masks, and for deflections.
-        passes: lowest and highest (x, y) of the opening in its plane, metres.
         chosen: points of its textures; None chooses now.
         follow: given if its parameters are to follow a camera.
         parts: cached parts of nearby plans.
@@ -336,11 +336,10 @@ class _Met:
     """
 
     stage: Stage
-    region: tuple[Array, Array]
+    region: Region
     footprint: Array | None
     index_from_slope: Array | None
     sizes: tuple[tuple[int, ...], tuple[int, ...]]
-    passes: tuple[Array, Array]
     chosen: tuple[Points, ...] | None
     follow: Follow | None
     parts: Parts
@@ -388,14 +387,15 @@ def steps_met(
     pending = Affine.identity()
     by_ray = any(leg.stage.faces.by_ray is not None for leg in path.legs)
     extents = extents_at_legs(path, taken.aim) if by_ray else []
-    for leg, region in zip(path.legs, taken.regions, strict=True):
+    for leg, ends in zip(path.legs, taken.regions, strict=True):
         parts.check()
         pending = leg.undone @ pending
         stage, faces = leg.stage, leg.stage.faces
         own = None if chosen is None else chosen[leg.number]
         points = None if own is None else own.textures
         onward, wide = path.index_from_slope(leg), footprint(path, taken.aim, leg)
-        met = _Met(stage, region, wide, onward, sizes, leg.stop, points, follow, parts)
+        region = Region(stage.element.decentre, ends, leg.stop)
+        met = _Met(stage, region, wide, onward, sizes, points, follow, parts)
         here: list[steps.Step] = []
         with stage.named():
             at = _is_aimed_at(taken.aim, leg)
@@ -503,7 +503,7 @@ def _transmission(pattern: Pattern, met: _Met) -> list[steps.Step]:
         return np.asarray(pattern(x, y))[..., None]
 
     enough = None if met.footprint is None else met.footprint / POINTS_PER_FOOTPRINT
-    sampled = Sampled(means, decentre, met.region, met.passes, pattern, itself)
+    sampled = Sampled(means, met.region, pattern, itself)
     texture, error = met.texture(sampled, met.sizes[0], Enough(spacing=enough))
     if error > WORTH_SAYING:
         note = f"{label} is finer than its texture shows: {error:.1%} root mean square of its largest value"
@@ -518,13 +518,12 @@ def _by_ray(transmission: RayTransmission, extent: RayExtent, met: _Met) -> step
     """The step that weights rays by a function of place and slope."""
     ends = (extent.middle - extent.half)[2:], (extent.middle + extent.half)[2:]
     unbounded = np.full(2, -np.inf), np.full(2, np.inf)
-    by_place = Sampled(_unknown, met.stage.element.decentre, met.region, met.passes, None)
-    by_slope = Sampled(_unknown, (0.0, 0.0), ends, unbounded, None)
-    boxes = [each.from_middle() for each in (by_place, by_slope)]
+    regions = met.region, Region((0.0, 0.0), ends, unbounded)
+    boxes = [each.from_middle() for each in regions]
     if met.chosen is not None:
         boxes = [points.box for points in met.chosen]
     elif met.follow is not None:
-        boxes = [each.with_room().from_middle() for each in (by_place, by_slope)]
+        boxes = [each.with_room().from_middle() for each in regions]
     slices = met.parts.part(
         "slices of a transmission",
         lambda: (content(transmission), content(boxes)),
@@ -532,22 +531,16 @@ def _by_ray(transmission: RayTransmission, extent: RayExtent, met: _Met) -> step
     )
     coarse = len(met.sizes[1]) == 1
 
-    def texture(sampled: Sampled, values: Function, n: int) -> steps.Texture:
-        sampled = replace(sampled, values=values, of=(transmission, boxes, n))
+    def texture(values: Function, n: int) -> steps.Texture:
+        sampled = Sampled(values, regions[n], of=(transmission, boxes, n))
         made, _ = met.texture(sampled, slices.sizes[:1] if coarse else slices.sizes, EXACT)
         return replace(made, values=made.values.astype(_kind(met.follow), copy=False))
 
-    there, towards = texture(by_place, slices.by_place, 0), texture(by_slope, slices.by_slope, 1)
-    step = steps.SharesByRay(there, towards, met.label)
-    rays = rays_within(extent, by_place.middle, by_place.from_middle())
+    step = steps.SharesByRay(texture(slices.by_place, 0), texture(slices.by_slope, 1), met.label)
+    rays = rays_within(extent, met.region.middle, met.region.from_middle())
     if len(rays):
-        _state_error(missed(step, transmission, rays, by_place.middle), len(rays), step, met)
+        _state_error(missed(step, transmission, rays, met.region.middle), len(rays), step, met)
     return step
-
-
-def _unknown(x: Array, y: Array, spacing: tuple[float, float]) -> Array:
-    """Values that are replaced once they are known."""
-    raise NotImplementedError
 
 
 def _state_error(error: float, rays: int, step: steps.SharesByRay, met: _Met) -> None:
@@ -593,7 +586,7 @@ def _deflection(met: _Met) -> steps.Step:
         s, t = bending(x, y)
         return np.stack(np.broadcast_arrays(s, t), axis=-1)
 
-    sampled = Sampled(slopes, decentre, met.region, met.passes, bending)
+    sampled = Sampled(slopes, met.region, bending)
     texture, error = met.texture(sampled, met.sizes[1], Enough(index_from_value=met.index_from_slope))
     if error > WORTH_SAYING:
         met.notes.append(
@@ -639,7 +632,7 @@ def _sheet(given: object, met: _Met) -> steps.Texture:
         shape = np.broadcast_shapes(x.shape, y.shape)
         return values[..., None] if values.shape == shape else values
 
-    sampled = Sampled(numbers, decentre, met.region, met.passes, given)
+    sampled = Sampled(numbers, met.region, given)
     return met.texture(sampled, met.sizes[1], EXACT)[0]
 
 

@@ -58,7 +58,7 @@ class _Edge:
     words: str
 
 
-def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: int = PIXELS) -> tuple[str, ...]:
+def edges_that_cut(core: Rays, changed: Collection[str] | None = None) -> tuple[str, ...]:
     """The hard edges that cut aimed rays, as text.
 
     Rays of pixels all over the sensor are traced: an edge cuts if some of them pass it and others do not, or
@@ -68,12 +68,9 @@ def edges_that_cut(core: Rays, changed: Collection[str] | None = None, pixels: i
         core: the rays.
         changed: names of parameters (`vcc.plan.parameters.parameters` of the core) that change: only edges that
             move against rays then count. None: all edges that cut.
-        pixels: pixels a side of the sensor that are traced.
     """
     found = dict.fromkeys(
-        edge.words
-        for edge in _edges(core, pixels)
-        if changed is None or any(_moves(core, edge, name) for name in changed)
+        edge.words for edge in _edges(core) if changed is None or any(_moves(core, edge, name) for name in changed)
     )
     return tuple(found)
 
@@ -96,7 +93,7 @@ def check_no_edge(core: Rays, wanted: Collection[str]) -> None:
                 "them, and stays as it is. Learn the lens's place, and what stands around it"
             )
     of_edges = [(name, n) for name in wanted for n, step in enumerate(core.steps) if _names(name, n, step, EDGES)]
-    cutting = {edge.number: edge.words for edge in _edges(core, PIXELS)} if of_edges else {}
+    cutting = {edge.number: edge.words for edge in _edges(core)} if of_edges else {}
     for name, n in of_edges:
         if n in cutting:
             raise InputError(
@@ -140,12 +137,12 @@ def _moved_from(core: Rays, name: str) -> int:
     return 0
 
 
-def _edges(core: Rays, pixels: int) -> list[_Edge]:
+def _edges(core: Rays) -> list[_Edge]:
     """The edges that cut, in the order in which rays meet them."""
     core = core.more(min(core.samples, RAYS))
     if isinstance(core.aim, Window) and core.aim.visible is not None:
         core = replace(core, aim=replace(core.aim, visible=None))  # rays at what is visible meet no edge
-    rows, columns = (np.unique(np.linspace(0, n - 1, pixels).round().astype(np.int64)) for n in core.raster_shape)
+    rows, columns = (np.unique(np.linspace(0, n - 1, PIXELS).round().astype(np.int64)) for n in core.raster_shape)
     pixel = (rows[:, None] * core.raster_shape[1] + columns).reshape(-1)
     rays, cells = core.aimed(pixel, core.block(pixel))
     found = []

@@ -20,6 +20,7 @@ from vcc.plan.rays.steps import Texture
 from vcc.shapes.patterns import Pattern
 
 Array = NDArray[np.float64]
+Box = tuple[Array, Array]
 Function = Callable[[Array, Array, tuple[float, float]], Array]
 """Values at points of a texture, of (x, y, spacing)."""
 
@@ -44,40 +45,51 @@ ROOM = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Region(Brief):
+    """The part of an element that rays meet.
+
+    Args:
+        middle: place (x, y) of the element, metres.
+        ends: lowest and highest (x, y) at which rays meet it, metres.
+        passes: lowest and highest (x, y) of the opening in its plane; infinite if nothing bounds it.
+    """
+
+    middle: tuple[float, float]
+    ends: Box
+    passes: Box
+
+    def from_middle(self) -> Box:
+        """Its ends, relative to the element's middle."""
+        low, high = self.ends
+        return low - self.middle, high - self.middle
+
+    def with_room(self) -> Region:
+        """The same with a margin."""
+        (low, high), (lowest, highest) = self.ends, self.passes
+        room = ROOM * (high - low)
+        low, high = (
+            np.maximum(low - room, np.minimum(lowest, low)),
+            np.minimum(high + room, np.maximum(highest, high)),
+        )
+        return replace(self, ends=(low, high))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Sampled(Brief):
     """A function of position to sample, of an element.
 
     Args:
         values: the values at points of a texture, a function of (x, y, spacing), places (1, columns) and
             (rows, 1) in metres from the element's middle.
-        middle: place (x, y) of the element, metres.
-        region: lowest and highest (x, y) at which rays meet it, metres.
-        passes: lowest and highest (x, y) of the opening in its plane; infinite if nothing bounds it.
+        region: where rays meet the element.
         of: the object that the values belong to; equal objects have equal values.
         itself: the function of (x, y) that the texture approximates, if different from ``values``.
     """
 
     values: Function
-    middle: tuple[float, float]
-    region: tuple[Array, Array]
-    passes: tuple[Array, Array]
+    region: Region
     of: object
     itself: Callable[[Array, Array], Array] | None = None
-
-    def from_middle(self) -> tuple[Array, Array]:
-        """The region, relative to the element's middle."""
-        low, high = self.region
-        return low - self.middle, high - self.middle
-
-    def with_room(self) -> Sampled:
-        """The same with a margin around the region."""
-        (low, high), (lowest, highest) = self.region, self.passes
-        room = ROOM * (high - low)
-        region = (
-            np.maximum(low - room, np.minimum(lowest, low)),
-            np.minimum(high + room, np.maximum(highest, high)),
-        )
-        return replace(self, region=region)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,7 +127,7 @@ class Points(Brief):
     error: float
 
     @property
-    def box(self) -> tuple[Array, Array]:
+    def box(self) -> Box:
         """Lowest and highest (x, y) of the points."""
         low = np.array(self.start)
         return low, low + np.array(self.spacing) * (self.size - 1)
@@ -138,8 +150,8 @@ def choose_points(sampled: Sampled, sizes: tuple[int, ...], enough: Enough) -> P
         sizes: see `made_fine_enough`.
         enough: see `made_fine_enough`.
     """
-    texture, error = made_fine_enough(sampled.with_room(), sizes, enough)
-    x, y = (start - middle for start, middle in zip(texture.start, sampled.middle, strict=True))
+    texture, error = made_fine_enough(replace(sampled, region=sampled.region.with_room()), sizes, enough)
+    x, y = (start - middle for start, middle in zip(texture.start, sampled.region.middle, strict=True))
     return Points(texture.values.shape[0], (x, y), texture.spacing, error)
 
 
@@ -154,14 +166,14 @@ def at_points(sampled: Sampled, points: Points, parts: Parts) -> Texture:
     Raises:
         InputError: a region beyond the points.
     """
-    if not points.holds(*sampled.from_middle()):
+    if not points.holds(*sampled.region.from_middle()):
         raise plan_again("where rays meet an element")
     values = parts.part(
         "texture met by rays",
         lambda: (content(sampled.of), content(points)),
         lambda: _values(sampled, points.start, points.spacing, points.size),
     )
-    x, y = (start + middle for start, middle in zip(points.start, sampled.middle, strict=True))
+    x, y = (start + middle for start, middle in zip(points.start, sampled.region.middle, strict=True))
     return Texture(values, (x, y), points.spacing)
 
 
@@ -177,7 +189,7 @@ def made_fine_enough(sampled: Sampled, sizes: tuple[int, ...], enough: Enough = 
     Returns:
         The texture, and its root mean square error as a share of its largest value.
     """
-    low, high = sampled.region
+    (low, high), middle = sampled.region.ends, sampled.region.middle
     extent = np.maximum(high - low, 1e-9)
     generator = np.random.default_rng(0)
     x, y = (low[n] + extent[n] * generator.random(4096) for n in (0, 1))
@@ -186,9 +198,9 @@ def made_fine_enough(sampled: Sampled, sizes: tuple[int, ...], enough: Enough = 
         size = left.pop(0)
         spacing = (float(extent[0] / (size - 1)), float(extent[1] / (size - 1)))
         start = float(low[0]), float(low[1])
-        values = _values(sampled, start, spacing, size, sampled.middle)
+        values = _values(sampled, start, spacing, size, middle)
         texture = Texture(values, start, spacing)
-        from_middle = x - sampled.middle[0], y - sampled.middle[1]
+        from_middle = x - middle[0], y - middle[1]
         truth = np.asarray(
             sampled.values(*from_middle, spacing) if sampled.itself is None else sampled.itself(*from_middle)
         )

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from vcc.engines.compiled import compiled
+from vcc.engines.compiled import fast_loop
 
 TILE = 16
 """Pixels a side of a tile. A row of a tile is one or two vectors of the processor."""
@@ -29,10 +29,8 @@ RECORD = 15
 """Numbers of a projected splat: column, row, the inverse covariance (xx, xy, yy), opacity, logarithm of the least
 share of it that is drawn, red, green, blue, depth, its slope along columns and rows, half width, half height."""
 
-_compiled = compiled(fastmath={"contract", "reassoc", "nsz"})
 
-
-@_compiled
+@fast_loop
 def placed(positions, sizes, rotations, order, matrix, out):  # type: ignore[no-untyped-def]
     """Splats in the coordinates of the array, in order of depth.
 
@@ -64,7 +62,7 @@ def placed(positions, sizes, rotations, order, matrix, out):  # type: ignore[no-
                 k += 1
 
 
-@_compiled
+@fast_loop
 def project(first, last, scene, view, low_pass, out, bounds):  # type: ignore[no-untyped-def]
     """Project splats first to last; a splat that is not drawn gets a last row before its first.
 
@@ -132,7 +130,7 @@ def project(first, last, scene, view, low_pass, out, bounds):  # type: ignore[no
         colour(harmonics[order[n]], coefficients, dx, dy, dz, record)
 
 
-@_compiled
+@fast_loop
 def colour(c, coefficients, x, y, z, record):  # type: ignore[no-untyped-def]
     """The colour of a splat seen along the unit vector (x, y, z): real spherical harmonics up to degree 3.
 
@@ -155,7 +153,7 @@ def colour(c, coefficients, x, y, z, record):  # type: ignore[no-untyped-def]
         record[7 + k] = max(value + 0.5, 0.0)
 
 
-@_compiled
+@fast_loop
 def blend(first, last, records, bounds, background, image, depths, with_depth, ended):  # type: ignore[no-untyped-def]
     """Draw the rows of tiles first to last of an image.
 
@@ -210,7 +208,7 @@ def blend(first, last, records, bounds, background, image, depths, with_depth, e
                     depths[y0 + y, x0 + x] = median[y, x]
 
 
-@_compiled
+@fast_loop
 def draw(s, x0, y0, light, median, alpha, with_depth):  # type: ignore[no-untyped-def]
     """Blend one splat into a tile whose first pixel is (y0, x0)."""
     column, row = s[0] - np.float32(x0), s[1] - np.float32(y0)
@@ -247,7 +245,7 @@ def draw(s, x0, y0, light, median, alpha, with_depth):  # type: ignore[no-untype
                 line[3, x] = through - share
 
 
-@_compiled
+@fast_loop
 def small_exp(x):  # type: ignore[no-untyped-def]
     """exp(x) for −6 ≤ x ≤ 0 with a relative error below 2e-6, without branches, so that it runs in vectors.
 
