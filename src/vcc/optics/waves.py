@@ -48,6 +48,7 @@ class Pupil(Brief):
         steps: (x, y) from point to point on the entrance plane, metres.
         sensor_from_slope: B, 2×2, metres.
         focus: V, 2×2, 1/m: rays of the point in focus have slopes V·u plus a constant, A + B·V = 0.
+        middle: (x, y) of the middle of the points on the entrance plane, metres.
     """
 
     amplitude: Array
@@ -55,6 +56,7 @@ class Pupil(Brief):
     steps: tuple[float, float]
     sensor_from_slope: Array
     focus: Array
+    middle: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def of(cls, train: Train, at: tuple[float, float] = (0.0, 0.0), points: int = POINTS) -> Pupil:
@@ -71,11 +73,12 @@ class Pupil(Brief):
                 transmission by direction.
         """
         rays, steps, by_slope, focus = _rays_of_focus(train, at, points)
+        x, y = rays[..., :2].mean(axis=(0, 1))
         light, landing = _traced(train, rays)
         if not light.any():
             raise InputError("diffraction: no light of a point in focus passes the camera's stops")
         place = np.asarray(train.sensor.decentre) + np.asarray(at)
-        return cls(np.sqrt(light), landing - place, steps, by_slope, focus)
+        return cls(np.sqrt(light), landing - place, steps, by_slope, focus, (float(x), float(y)))
 
     @property
     def points(self) -> int:
