@@ -157,6 +157,11 @@ class _Making:
                 "column)"
             )
         refuse(train, "one plan for all channels")
+        if how.diffraction == "depth":
+            raise InputError(
+                "diffraction='depth' follows the disparities of a light field, and belongs to images alone: use "
+                "camera.capture, or diffraction=True here"
+            )
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts
 

@@ -37,6 +37,7 @@ LARGEST_ESTIMATE = 401
 """Largest side, pixels, of the images of points by which they are estimated."""
 HALO = 100
 """Largest margin around the blur by rays in them, pixels; light beyond comes in again, in all images alike."""
+IN_FOCUS_ONLY = "diffraction=True is exact for points in focus without aberrations only"
 SAME_LIGHT = 1e-6
 """Share of a pupil's light that rounding may change; one of 512² points is more."""
 WORTH_A_WARNING = 0.2
@@ -231,7 +232,7 @@ class StopDiffraction(Brief):
             if convolved > worst:
                 worst, warned = (
                     convolved,
-                    f"diffraction=True is exact for points in focus without aberrations only: {words}",
+                    f"{IN_FOCUS_ONLY}: {words}; diffraction='depth' follows depths",
                 )
         return tuple(notes), (warned,) if warned else ()
 
