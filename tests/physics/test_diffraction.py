@@ -297,7 +297,7 @@ GRAIN = np.random.default_rng(0).integers(0, 2, (64, 64)).astype(float)
         ([LENS, vcc.AngleFilter(vcc.patterns.Circle(0.1), z=10 * mm)], {}, "by its direction"),
         ([LENS, vcc.RayFilter(lambda x, y, s, t: 0.5 + 0 * x * s, z=10 * mm)], {}, "by its direction"),
         ([LENS], {"between_views": "depth"}, "do not go together"),
-        ([LENS], {"diffraction": "yes"}, "True or False"),
+        ([LENS], {"diffraction": "yes"}, "True, False or 'depth'"),
     ],
 )
 def test_what_one_convolution_cannot_do_is_refused(elements, options, words):
