@@ -106,7 +106,7 @@ def test_what_is_not_by_waves_is_said_with_its_share():
         (lambda light: LENS.compile(light, diffraction="depth"), "belongs to images alone"),
         (lambda light: LENS.operator(light, diffraction="depth"), "belongs to images alone"),
         (lambda light: CameraModule(LENS, light, diffraction="depth"), "belongs to images alone"),
-        (lambda light: LENS.expose(light, diffraction="depth", plan=3), "makes its own plan"),
+        (lambda light: LENS.capture(light, diffraction="depth", plan=3), "makes its own plan"),
         (
             lambda light: LENS.capture(light.replaced(torch.tensor(light.values)), diffraction="depth"),
             "it passes no gradients",
