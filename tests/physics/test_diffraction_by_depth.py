@@ -25,11 +25,13 @@ from vcc.units import mm, um
 
 @pytest.mark.filterwarnings("ignore:diffraction=True is exact")
 @pytest.mark.parametrize(
-    ("kind", "waves", "left"), [("disc", 2.0, 0.035), ("code", 2.0, 0.025), ("code", 3.9, 0.025)]
+    ("kind", "waves", "left", "views"),
+    [("disc", 2.0, 0.035, 15), ("code", 2.0, 0.025, 15), ("code", 3.9, 0.03, 14)],
 )
-def test_a_defocused_point_is_that_of_the_angular_spectrum(kind, waves, left):
+def test_a_defocused_point_is_that_of_the_angular_spectrum(kind, waves, left, views):
     """What is left: views average the code over their cells, 1/15 of the stop, and kernels are interpolated over a
-    quarter of a wave. By rays and one convolution, more than five times as much, 18 to 28 %."""
+    quarter of a wave. By rays and one convolution, more than five times as much, 18 to 28 %. The middle one of 14
+    views is beside the axis."""
     distance = 1 / (1 / NEAR - 8 * GREEN * waves / SMALL**2)
     pixel, size = 5, 101
     small = camera_of(kind, distance, pixel * um)
@@ -37,7 +39,7 @@ def test_a_defocused_point_is_that_of_the_angular_spectrum(kind, waves, left):
     first = WINDOW // 2 - size * pixel // 2
     truth = whole[first : first + size * pixel, first : first + size * pixel]
     truth = truth.reshape(size, pixel, size, pixel).sum(axis=(1, 3))
-    light = star(small, side=301, views=15, width=SMALL)
+    light = star(small, side=301, views=views, width=SMALL)
     errors = {}
     for how in (False, True, "depth"):
         image = np.float64(small.capture(light, diffraction=how, scene_distance=math.inf).values)

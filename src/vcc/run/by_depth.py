@@ -35,6 +35,8 @@ PINHOLE = 1e-4
 """Size of the pinhole of the sharp image, as a share of the spacing of views: its blur is as much smaller."""
 WAVES_APART = 0.25
 """Defocus between neighbouring layers, waves; between them, kernels are interpolated linearly."""
+MOST_LAYERS = ESTIMATED / 16 / WAVES_APART
+"""Layers on each side of the focus: the defocus that the points of the pupil resolve."""
 
 
 def through_pinhole(grid: Grid) -> Grid:
@@ -89,12 +91,11 @@ class DepthChange(Brief):
         vergence, unmatched = _vergences(light_field, how)
         pupil = Pupil.of(train, points=ESTIMATED)
         made = _Kernels(stop, pupil)
-        steps = np.unique(np.round(vergence / made.apart)).astype(int)
-        steps = np.unique([steps - 1, steps, steps + 1])
-        kernels = {int(n): made.of(n * made.apart) for n in steps}
-        kept = {n: kernel for n, kernel in kernels.items() if kernel is not None}
         at = vergence / made.apart
-        missing = ~np.isin(np.floor(at).astype(int), list(kept)) | ~np.isin(np.ceil(at).astype(int), list(kept))
+        around = np.floor(at), np.ceil(at)
+        kernels = {float(n): made.of(n) for n in np.unique(around) if abs(n - made.in_focus) <= MOST_LAYERS}
+        kept = {n: kernel for n, kernel in kernels.items() if kernel is not None}
+        missing = ~np.isin(around, list(kept)).all(axis=0)
         margin = max((len(kernel) // 2 for kernel in kept.values()), default=0)
         rows, columns = train.sensor.shape
         shape = rows + 2 * margin, columns + 2 * margin
@@ -103,7 +104,8 @@ class DepthChange(Brief):
         for n, kernel in kept.items():
             weight = np.maximum(1 - np.abs(at - n), 0) * ~missing
             if weight.any():
-                total = total + np.fft.rfft2(sharp.of(weight), axes=(0, 1)) * _transform(kernel, shape)
+                spectrum = _transform(kernel, shape, made.shift(n, sharp.seen_from))
+                total = total + np.fft.rfft2(sharp.of(weight), axes=(0, 1)) * spectrum
         added = np.fft.irfft2(total, shape, axes=(0, 1)) if not np.isscalar(total) else np.zeros((*shape, 1))
         cut = added[margin : margin + rows, margin : margin + columns]
         channels = grid.shape[4:]
@@ -158,13 +160,25 @@ class _Kernels(Brief):
 
     @property
     def apart(self) -> float:
-        """Of neighbouring layers, 1/m."""
+        """Of neighbouring layers, 1/m; layer n is at n times this."""
         width = max(self.pupil.steps) * self.pupil.points
         return 8 * min(self.stop.wavelengths) * WAVES_APART / width**2
 
-    def of(self, vergence: float) -> Array | None:
-        """(rows, columns, bands) at 1/Z; None if the defocus is not resolved, or the image too large."""
+    @property
+    def in_focus(self) -> float:
+        """The number of the layer in focus, between whole ones."""
+        return float(np.trace(self.pupil.focus)) / 2 / self.apart
+
+    def shift(self, layer: float, seen_from: Array) -> Array:
+        """(x, y), pixels, from what the middle view shows to rays through the middle of the pupil."""
+        defocus = layer * self.apart * np.eye(2) - self.pupil.focus
+        frame = self.stop.train.sensor.frame.inverse().linear
+        return np.asarray(frame @ self.pupil.sensor_from_slope @ defocus @ (self.pupil.middle - seen_from))
+
+    def of(self, layer: float) -> Array | None:
+        """(rows, columns, bands) of a layer; None if the defocus is not resolved, or the image too large."""
         frame, pupil = self.stop.train.sensor.frame.inverse().linear, self.pupil
+        vergence = layer * self.apart
         lit = pupil.slopes(vergence)[pupil.amplitude > 0] @ (frame @ pupil.sensor_from_slope).T
         size = 2 * math.ceil(np.abs(lit).max() + min(self.stop.half_width, HALO)) + 1
         bands = self.stop.wavelengths
@@ -187,6 +201,7 @@ class _Sharp:
 
     def __init__(self, train: Train, light_field: Samples, pupil: Pupil, shape: tuple[int, int], how: How) -> None:
         grid = through_pinhole(light_field.grid)
+        self.seen_from = grid.frame([0.0, 0.0, (grid.shape[3] - 1) / 2, (grid.shape[2] - 1) / 2])[:2]
         j, i = light_field.grid.middle_view
         nt, ns = light_field.grid.shape[2:4]
         whole = to_numpy(light_field.read(Block((j, j + 1), (i, i + 1), (0, nt), (0, ns))))
@@ -194,7 +209,15 @@ class _Sharp:
         to_sensor = train.arriving_at_sensor
         self.grid = replace(grid, frame=to_sensor @ grid.frame, kind=np.dtype(np.float32))
         sensor = replace(train.sensor, z=0.0, shape=shape, electronics=None, angular_response=None)
-        self.how = replace(how, method="footprints", diffraction=False, scene_distance=None, between_views="none")
+        self.how = replace(
+            how,
+            method="footprints",
+            diffraction=False,
+            scene_distance=None,
+            between_views="none",
+            samples=None,
+            tolerance=None,
+        )
         self.plan = compile_best(Train([], sensor), self.grid, self.how)
         cell = abs(np.linalg.det(self.grid.frame.linear[:2, 2:]))
         by_slope = abs(np.linalg.det(pupil.sensor_from_slope))
@@ -210,9 +233,11 @@ class _Sharp:
         return np.asarray(irradiance * self.scale)
 
 
-def _transform(kernel: Array, shape: tuple[int, int]) -> NDArray[np.complex128]:
-    """The spectrum of a kernel about its middle, on a raster that is larger."""
+def _transform(kernel: Array, shape: tuple[int, int], shift: Array) -> NDArray[np.complex128]:
+    """The spectrum of a kernel about its middle, moved by (x, y) pixels, on a raster that is larger."""
     size = len(kernel)
     padded = np.zeros((*shape, kernel.shape[2]))
     padded[:size, :size] = kernel
-    return np.asarray(np.fft.rfft2(np.roll(padded, (-(size // 2),) * 2, (0, 1)), axes=(0, 1)))
+    found = np.fft.rfft2(np.roll(padded, (-(size // 2),) * 2, (0, 1)), axes=(0, 1))
+    cycles = np.fft.fftfreq(shape[0])[:, None] * shift[1] + np.fft.rfftfreq(shape[1]) * shift[0]
+    return np.asarray(found * np.exp(-2j * math.pi * cycles)[..., None])
