@@ -90,6 +90,8 @@ def test_layers_far_from_an_edge_are_those_of_single_planes_and_light_is_conserv
         assert np.abs(part - one).max() < 0.01 * one.max()
     stop = np.float64(LENS.capture(seen(far, near), diffraction=True).values)
     assert both.sum() == pytest.approx(stop.sum(), rel=2e-3)
+    swept = vcc.sweep(LENS, seen(far, near), {"sensor.z": [D]}, **options)
+    assert np.allclose(swept.pictures[0][..., 0], both, rtol=1e-5)
     # In focus there is nothing to change.
     assert np.allclose(first, LENS.capture(seen(far), diffraction=True).values[..., 0], rtol=1e-3)
 
