@@ -27,7 +27,8 @@ import numpy as np
 
 import vcc
 from vcc.camera import Camera
-from vcc.dataset import make_dataset, recording_pairs, shards
+from vcc.dataset import make_dataset, open_dataset, recording_pairs, shards
+from vcc.dataset.zarr_group import ZarrGroup
 from vcc.store import open_store
 from vcc.units import mm, ms
 
@@ -42,6 +43,7 @@ STEPS = (
     ("noise", recording_pairs, "expose_image"),
     ("depth", recording_pairs.Recorder, "_depth"),
     ("writing", shards, "_add"),
+    ("writing", ZarrGroup, "_put"),
 )
 
 
@@ -78,6 +80,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--executor", choices=("none", "processes"), default="none")
+    parser.add_argument("--kind", choices=("webdataset", "zarr"), default="webdataset")
     asked = parser.parse_args()
     warnings.simplefilter("ignore", vcc.ResultWarning)
     field = open_store(DESK)
@@ -88,6 +91,7 @@ def main() -> None:
         "exposure": 10 * ms,
         "radiance": 0.01,
         "truth": ("sharp", "depth"),
+        "kind": asked.kind,
     }
     folder = Path(tempfile.mkdtemp())
     spent: dict[str, float] = {}
@@ -108,7 +112,11 @@ def main() -> None:
                 before = processor()
                 wall, _ = make("pairs", asked.count, executor=executor)
             used = (processor() - before) / asked.count * 1e3  # of workers that have ended
-        size = sum(each.stat().st_size for each in (folder / "pairs").iterdir()) / asked.count
+        size = sum(each.stat().st_size for each in (folder / "pairs").rglob("*") if each.is_file()) / asked.count
+        pairs, began = open_dataset(folder / "pairs"), time.process_time()
+        for pair in pairs:
+            pair["recording"]
+        spent["reading it again"] = time.process_time() - began
     finally:
         shutil.rmtree(folder)
     print(

@@ -32,6 +32,7 @@ from vcc.plan.choice import compile_best, compiled_each, mixture_of
 from vcc.plan.how import OF_THE_RUN, How, Options
 from vcc.plan.model import Plan
 from vcc.plan.protocol import OutputBuffers
+from vcc.plan.stop_diffraction import IN_FOCUS_ONLY
 from vcc.plot.camera_plot import plot_camera
 from vcc.recording import Recording, recorded
 from vcc.run.bands import (
@@ -46,6 +47,7 @@ from vcc.run.bands import (
     response_matrix,
 )
 from vcc.run.batches import may_be_mixed, recorded_each, recorded_mixed
+from vcc.run.by_depth import DepthChange
 from vcc.run.drive import Recorded, drive
 from vcc.run.expose import Exposure
 from vcc.run.operator import BandOperator, LinearMap, Operator
@@ -347,6 +349,8 @@ class Camera(Train):
                     "column)"
                 )
             return self._of_parts(light_field, chosen, executor, progress)
+        if chosen.diffraction == "depth":
+            return self._by_depth(light_field, chosen, plan, executor, progress)
         if self.depends_on_bands:
             return self._captured_by_bands(light_field, chosen, plan, options, executor, progress)
         cautions = Cautions(self, light_field.grid)
@@ -356,6 +360,24 @@ class Camera(Train):
         found = drive(plan, light_field, chosen, progress, executor)
         _warn_of(cautions.of(plan, light_field, found, chosen))
         return self._image(found)
+
+    def _by_depth(
+        self, light_field: Samples, how: How, plan: Any, executor: Any, progress: Progress | None
+    ) -> Image:
+        """The image with the diffraction of each depth."""
+        if plan is not None or self.depends_on_bands:
+            raise InputError(
+                "diffraction='depth' makes its own plan, of a camera that all bands meet alike: leave plan out, "
+                "and capture one band with camera.at_wavelength"
+            )
+        stop = dataclasses.replace(how, diffraction=True)
+        change = DepthChange.of(self, light_field, how)
+        plan = self.compile(light_field, stop)
+        assert isinstance(plan, Plan)
+        cautions = (each for each in plan.cautions if not each.startswith(IN_FOCUS_ONLY))
+        plan = dataclasses.replace(plan, cautions=(*cautions, *change.cautions))
+        image = self.capture(light_field, stop, plan=plan, executor=executor, progress=progress)
+        return dataclasses.replace(image, values=image.values + change.values)
 
     def _of_parts(self, light_field: Samples, how: How, executor: Any, progress: Progress | None) -> Image:
         """The image of pixels that alternate, or that have several photodiodes, made of an image of each."""
@@ -689,7 +711,7 @@ def each_captured(
     """
     check_is_light_field(light_field)
     light_field.check_complete()
-    if how.between_views == "depth" or any(camera.depends_on_bands for camera in cameras):
+    if "depth" in (how.between_views, how.diffraction) or any(camera.depends_on_bands for camera in cameras):
         hows = [how] * len(cameras) if seeds is None else [dataclasses.replace(how, seed=seed) for seed in seeds]
         yield from enumerate(camera.capture(light_field, one) for camera, one in zip(cameras, hows, strict=True))
         return

@@ -15,6 +15,7 @@ from scipy.special import j1
 import vcc
 from vcc.analysis import expected_deblurring_error, mtf, natural_image_power, otf, psf
 from vcc.base.units import mm, um
+from vcc.gallery.diffuser_depth_of_field import RandomRings
 from vcc.shapes.kernels import Gaussian, TopHat
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Cubic
@@ -251,6 +252,23 @@ def test_limits_of_the_expected_error():
 
 def refused(words):
     return pytest.raises(vcc.InputError, match=re.escape(words))
+
+
+@pytest.mark.parametrize("power", [0, 1])
+def test_a_plate_whose_slopes_jump_is_that_of_random_rays(power):
+    """Rings with random slopes, and a tip in the middle: x = u + d·(u/Z − u/f − slope) of 10⁶ rays of its own."""
+    surface = RandomRings(8 * mm, 0.01, power, rings=40)
+    lens = [vcc.Lens(50 * mm), vcc.PhasePlate(surface, diameter=16 * mm)]
+    camera = vcc.Camera(lens, vcc.Sensor(52 * mm, (9, 9), 0.1 * mm))
+    found = psf(camera, 1.0, shape=(25, 25))
+    places = (np.random.default_rng(1).random((2, 2 * 10**6)) - 0.5) * 16 * mm
+    places = places[:, np.hypot(*places) < 8 * mm]
+    landed = places + 52 * mm * (places / 1.0 - places / (50 * mm) + np.stack(surface.slopes(*places)))
+    edges = (np.arange(26) - 12.5) * 0.1 * mm
+    truth = np.histogram2d(*landed[::-1], bins=[edges, edges])[0] / places.shape[1]
+    noise = np.sqrt(truth / places.shape[1]).sum() / 2
+    # Cells at the edges of rings go to one side of a jump, evenly to both.
+    assert np.abs(found.values - truth).sum() / 2 < noise + 0.01
 
 
 def test_what_is_refused():

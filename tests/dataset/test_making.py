@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,8 @@ import numpy as np
 import pytest
 import torch
 import webdataset
+import xarray
+import zarr
 from webdataset.tariterators import group_by_keys, tar_file_expander
 
 import vcc
@@ -64,7 +67,7 @@ def made(path, **more):
 
 
 def contents(path):
-    return {each.name: each.read_bytes() for each in sorted(path.iterdir())}
+    return {str(each.relative_to(path)): each.read_bytes() for each in sorted(path.rglob("*")) if each.is_file()}
 
 
 @pytest.fixture(scope="module")
@@ -72,20 +75,55 @@ def pairs(tmp_path_factory):
     return made(tmp_path_factory.mktemp("sets") / "pairs", licence="CC0")
 
 
-def test_threads_and_a_resumed_run_write_the_same_bytes(pairs, tmp_path):
+@pytest.fixture(scope="module")
+def zarr_pairs(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("sets") / "zarr", licence="CC0", kind="zarr")
+
+
+@pytest.fixture(params=["pairs", "zarr_pairs"])
+def either(request):
+    return request.getfixturevalue(request.param)
+
+
+THIRD = {"webdataset": "pairs-000002.tar", "zarr": "pairs.zarr/pair/c/2"}
+LEFT = {
+    "webdataset": ".pairs-000002.0badcafe-1-00000000.part.tar",
+    "zarr": "pairs.zarr/pair/c/2.0badcafe.partial",
+}
+
+
+def test_threads_and_a_resumed_run_write_the_same_bytes(either, tmp_path):
+    pairs, kind = either, either.disk.kind
     with ThreadPoolExecutor(3) as executor:
-        made(tmp_path / "threads", executor=executor, licence="CC0")
+        made(tmp_path / "threads", executor=executor, licence="CC0", kind=kind)
     assert contents(tmp_path / "threads") == contents(pairs.path)
     done = []
-    (tmp_path / "threads" / "pairs-000002.tar").unlink()
-    (tmp_path / "threads" / ".pairs-000002.0badcafe-1-00000000.part.tar").write_bytes(b"left by a killed writer")
+    (tmp_path / "threads" / THIRD[kind]).unlink()
+    (tmp_path / "threads" / LEFT[kind]).write_bytes(b"left by a killed writer")
     with pytest.raises(vcc.InputError, match="unfinished: 1 of 4 shards are missing"):
         open_dataset(tmp_path / "threads")
-    made(tmp_path / "threads", licence="CC0", progress=lambda n, total: done.append((n, total)))
+    made(tmp_path / "threads", licence="CC0", kind=kind, progress=lambda n, total: done.append((n, total)))
     assert done[0] == (7, 10)
     assert done[-1] == (10, 10)
     resumed = contents(tmp_path / "threads")
     assert {name: resumed[name] for name in contents(pairs.path)} == contents(pairs.path)
+
+
+def test_a_zarr_group_has_the_pairs_of_the_shards_and_the_card(pairs, zarr_pairs):
+    for one, other in zip(pairs, zarr_pairs, strict=True):
+        assert one.keys() == other.keys()
+        assert one["numbers"] == other["numbers"]
+        for name in one.keys() - {"numbers"}:
+            assert one[name].dtype == other[name].dtype
+            assert np.array_equal(one[name], other[name], equal_nan=True)
+    group = zarr.open_group(zarr_pairs.path / "pairs.zarr", mode="r")
+    assert group.attrs["dataset"] == pairs.card == zarr_pairs.card
+    assert group["views"].chunks == (1, *group["views"].shape[1:])
+    assert group["exposure_seconds"][:].tolist() == [each["numbers"]["exposure_seconds"] for each in pairs]
+    with xarray.open_zarr(zarr_pairs.path / "pairs.zarr", consolidated=False) as opened:
+        assert opened["depth"].dims == ("pair", "y", "x")
+        assert opened["depth"].attrs["units"] == "m"
+        assert opened["recording"].dtype == np.uint16
 
 
 CAMERA_FILE = """
@@ -108,15 +146,19 @@ read_noise = 2.0
 """
 
 
-def test_a_killed_command_resumes_and_processes_write_the_same_bytes(tmp_path):
+@pytest.mark.parametrize(
+    ("kind", "first"), [("webdataset", "pairs-000000.tar"), ("zarr", "pairs.zarr/recording/c/2/0/0/0")]
+)
+def test_a_killed_command_resumes_and_processes_write_the_same_bytes(tmp_path, kind, first):
     (tmp_path / "camera.toml").write_text(CAMERA_FILE)
     save_store(SCENES[0], tmp_path / "scene.zarr")
     command = ["dataset", tmp_path / "camera.toml", tmp_path / "scene.zarr", "--set", "code.pattern=mura,circle"]
     command += ["--count", 40, "--per-shard", 1, "--crop", 24, 32, "--flips", "--sharp", "--depth", "--psf", "1 m"]
+    command += ["--kind", kind]
     killed = subprocess.Popen(
         [sys.executable, "-m", "vcc", *map(str, command), "-o", str(tmp_path / "killed")], start_new_session=True
     )
-    while not (tmp_path / "killed" / "pairs-000000.tar").exists() and killed.poll() is None:
+    while not (tmp_path / "killed" / first).exists() and killed.poll() is None:
         time.sleep(0.01)
     os.killpg(killed.pid, signal.SIGKILL)
     killed.wait()
@@ -143,7 +185,8 @@ def test_webdataset_reads_the_shards(pairs):
         assert each["json"] == stored[number]["numbers"]
 
 
-def test_a_loader_of_pytorch_reads_it_in_a_worker(pairs):
+def test_a_loader_of_pytorch_reads_it_in_a_worker(either):
+    pairs = either
     # Spawned: JAX, if another test has loaded it, must not be forked.
     loader = torch.utils.data.DataLoader(
         pairs, batch_size=4, shuffle=True, num_workers=1, multiprocessing_context="spawn"
@@ -201,6 +244,8 @@ def test_renderers_videos_and_stores_give_the_pairs_of_their_light_fields(tmp_pa
 def test_what_is_there_is_not_mixed_or_overwritten(pairs, tmp_path):
     with pytest.raises(vcc.InputError, match=r"is another data set.*seed is 0 there and 1 now"):
         made(pairs.path, seed=1, licence="CC0")
+    with pytest.raises(vcc.InputError, match=r"of kind 'webdataset', not 'zarr'"):
+        made(pairs.path, licence="CC0", kind="zarr")
     with pytest.raises(vcc.InputError, match=r"is another data set"):
         make_dataset(pairs.path, CAMERA, SCENES[::-1], {"code.pattern": CODES}, **SETTINGS, licence="CC0")
     (tmp_path / "notes").mkdir()
@@ -229,6 +274,7 @@ def test_what_cannot_be_made_leaves_nothing(tmp_path):
         ("truth is a list", lambda: make_dataset(out, CAMERA, SCENES, truth=None)),
         ("executor must be", lambda: make_dataset(out, CAMERA, SCENES, executor="processes")),
         ("per_shard", lambda: make_dataset(out, CAMERA, SCENES, per_shard=0)),
+        ("kind is .webdataset. or", lambda: make_dataset(out, CAMERA, SCENES, kind="tar")),
         ("no parameter|has no", lambda: make_dataset(out, CAMERA, SCENES, {"cod.pattern": CODES})),
     ):
         with pytest.raises(vcc.InputError, match=said):
@@ -261,6 +307,32 @@ def test_damaged_files_are_named(pairs, tmp_path, name, change, said):
     for each in pairs.path.iterdir():
         (copy / each.name).write_bytes(each.read_bytes())
     damaged(copy, name, change)
+    with pytest.raises(vcc.InputError, match=said):
+        open_dataset(copy)[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "said"),
+    [
+        ("sharp/c/0/0/0/0", lambda data: data[:-9], "sharp/c/0/0/0/0 is damaged"),
+        ("sharp/c/0/0/0/0", lambda data: bytes([data[0] ^ 1]) + data[1:], "sharp/c/0/0/0/0 cannot be read"),
+        ("gain/c/0/0", lambda data: data + b" ", "gain/c/0/0 is damaged"),
+        ("sharp/c/0/0/0/0", None, "there is no chunk of pairs .*sharp/c/0/0/0/0"),
+        ("gain/zarr.json", None, "there is no array of pairs .*gain"),
+        ("sharp/zarr.json", lambda data: data.replace(b"crc32c", b"gzip"), "sharp/zarr.json"),
+        ("sharp/zarr.json", lambda data: data.replace(b'"/"', b'"/../"'), "sharp/zarr.json"),
+        ("sharp/zarr.json", lambda data: data.replace(b'"float32"', b'"float64"'), "data_type is float64"),
+        ("gain/zarr.json", lambda data: data.replace(b'"float64"', b'"string"'), "gain/zarr.json"),
+        ("gain/zarr.json", lambda data: b"[" * 10**5, "gain/zarr.json"),
+    ],
+)
+def test_damaged_arrays_are_named(zarr_pairs, tmp_path, name, change, said):
+    copy = tmp_path / "copy"
+    shutil.copytree(zarr_pairs.path, copy)
+    if change is None:
+        (copy / "pairs.zarr" / name).unlink()
+    else:
+        damaged(copy / "pairs.zarr", name, change)
     with pytest.raises(vcc.InputError, match=said):
         open_dataset(copy)[0]
 

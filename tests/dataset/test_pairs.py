@@ -132,12 +132,16 @@ def test_sharp_image_and_depth_of_a_plane_are_those_of_a_pinhole(views):
 
 
 def test_diffraction_belongs_to_the_recording_and_not_to_its_truth():
-    scene = field_of(RANDOM.random((3, 3, 60, 70), np.float32)).with_wavelengths((0.9e-6,))
+    disparity = np.full((60, 70), 0.1, np.float32)
+    scene = field_of(RANDOM.random((3, 3, 60, 70), np.float32), disparity=disparity).with_wavelengths((0.9e-6,))
     camera = camera_of().replace(sensor=vcc.Sensor(camera_of().sensor.z, (40, 48), 4e-6))
-    by_rays, by_waves = (
-        pair_of(recipe_of(camera, scene, how=vcc.How(threads=1, diffraction=waves))) for waves in (False, True)
+    by_rays, by_waves, by_depth = (
+        pair_of(recipe_of(camera, scene, how=vcc.How(threads=1, diffraction=waves)))
+        for waves in (False, True, "depth")
     )
-    np.testing.assert_array_equal(by_waves.arrays["sharp"], by_rays.arrays["sharp"])
+    for other in (by_waves, by_depth):
+        np.testing.assert_array_equal(other.arrays["sharp"], by_rays.arrays["sharp"])
+        assert other.numbers["irradiance_of_white"] == by_waves.numbers["irradiance_of_white"]
     assert not np.allclose(by_waves.arrays["recording"], by_rays.arrays["recording"], rtol=1e-3)
     with pytest.raises(vcc.InputError, match="traced by rays"):
         recipe_of(camera, scene, truth=("psf",), psf_distances=(1.0,), how=vcc.How(diffraction=True))

@@ -91,6 +91,7 @@ FORMATS = {
     "zarr disparity": Format(seeds.store_with_depth, "s.zarr", readers.store_with_depth, checked=True),
     "zarr video": Format(seeds.light_field_video, "v.zarr", readers.light_field_video, checked=True),
     "dataset": Format(seeds.dataset, "pairs", readers.dataset),
+    "dataset zarr": Format(seeds.zarr_dataset, "pairs", readers.dataset, checked=True),
     "sweep": Format(seeds.sweep, "s.zarr", readers.sweep),
     "camera npy": Format(seeds.camera(".npy"), "camera.toml", readers.camera),
     "camera csv": Format(seeds.camera(".csv"), "camera.toml", readers.camera),

@@ -320,10 +320,14 @@ def sweep(folder: Path) -> None:
     vcc.sweep(camera, light_field(), {"sensor.z": "51mm:53mm:3"}, metrics=["sharpness"], output=folder / "s.zarr")
 
 
-def dataset(folder: Path) -> None:
+def dataset(folder: Path, kind: Any = "webdataset") -> None:
     sensor = vcc.Sensor(0.052, (6, 8), 0.0005, electronics=vcc.Electronics())
     camera = vcc.Camera([vcc.Lens(0.05, name="main")], sensor)
-    make_dataset(folder / "pairs", camera, light_field(), count=3, per_shard=2)
+    make_dataset(folder / "pairs", camera, light_field(), count=3, per_shard=2, kind=kind)
+
+
+def zarr_dataset(folder: Path) -> None:
+    dataset(folder, "zarr")
 
 
 def camera(ending: str) -> Maker:

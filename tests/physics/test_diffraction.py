@@ -14,9 +14,11 @@ import vcc
 from tests.physics.wave_oracle import focused, propagated
 from vcc.affine import Affine
 from vcc.camera import captured_in_batches
+from vcc.learn.parameters import put, read
 from vcc.optics.waves import Pupil, point_spreads
 from vcc.plan.how import How
 from vcc.plan.stop_diffraction import StopDiffraction
+from vcc.torch import CameraModule
 from vcc.units import mm, nm, um
 
 GREEN = 550 * nm
@@ -295,7 +297,7 @@ GRAIN = np.random.default_rng(0).integers(0, 2, (64, 64)).astype(float)
         ([LENS, vcc.AngleFilter(vcc.patterns.Circle(0.1), z=10 * mm)], {}, "by its direction"),
         ([LENS, vcc.RayFilter(lambda x, y, s, t: 0.5 + 0 * x * s, z=10 * mm)], {}, "by its direction"),
         ([LENS], {"between_views": "depth"}, "do not go together"),
-        ([LENS], {"diffraction": "yes"}, "True or False"),
+        ([LENS], {"diffraction": "yes"}, "True, False or 'depth'"),
     ],
 )
 def test_what_one_convolution_cannot_do_is_refused(elements, options, words):
@@ -310,12 +312,56 @@ def test_a_light_field_without_wavelengths_is_refused_with_the_way_out():
         lens.compile(star(lens).with_wavelengths(None), diffraction=True)
 
 
-def test_learning_is_refused():
-    lens = camera(vcc.Lens(F), vcc.Mask(CODE, width=DIAMETER, name="code"))
-    from vcc.torch import CameraModule
+GREY = vcc.Mask(0.3 + 0.7 * np.random.default_rng(3).random((5, 5)), width=DIAMETER, name="code")
+TUBE = camera(vcc.Lens(F, name="main"), GREY, d=1.002 * F, shape=(15, 19), pitch=8 * um)
+BANDS = (480 * nm, 640 * nm)
 
-    with pytest.raises(vcc.InputError, match="while a camera learns"):
-        CameraModule(lens, star(lens), ["code.pattern.values"], diffraction=True)
+
+def test_gradients_of_learned_parameters_are_differences_of_images():
+    """The kernel follows the parameters: cells by a closed form, the rest by differences of plans.
+
+    Against central differences of captured images, which know nothing of it. Of a glass, each band has a plan.
+    """
+    tube = TUBE.replace(main=vcc.Lens(F, name="main", glass="N-BK7"))
+    rng = np.random.default_rng(1)
+    light = scene(rng.random((31, 33, 2)), tube, wavelengths=BANDS)
+    weights = rng.standard_normal((15, 19, 2))
+    names = ["code.pattern", "main.focal_length", "sensor.z"]
+    options = {"diffraction": True, "engine": "reference"}
+    model = CameraModule(tube, light, names, **options)
+    values = {name: torch.tensor(read(tube, name), requires_grad=True) for name in names}
+    image = model(values=values)
+    assert np.abs(image.detach().numpy() - tube.capture(light, **options).values).max() < 1e-6 * image.max()
+    (image * torch.tensor(weights)).sum().backward()
+    for name in names:
+        here = read(tube, name)
+        along = (1e-2 if name == "code.pattern" else 1e-5) * here * rng.uniform(0.5, 1.0, here.shape)
+        low, high = (
+            np.vdot(weights, np.float64(put(tube, {name: there}).capture(light, **options).values))
+            for there in (here - along, here + along)
+        )
+        # Images are in single precision: errors of some 1e-7, where steps change them by 1e-3 to 1e-4.
+        assert np.vdot(values[name].grad.numpy(), along) == pytest.approx((high - low) / 2, rel=2e-3)
+
+
+def test_the_learned_image_is_linear_in_samples_with_its_adjoint():
+    light = scene(np.random.default_rng(1).random((31, 33)), TUBE)
+    model = CameraModule(TUBE, light, ["sensor.z"], diffraction=True, engine="reference")
+    samples = torch.tensor(np.asarray(light.values, np.float64), requires_grad=True)
+    weights = np.random.default_rng(2).random((15, 19))
+    (model(samples) * torch.tensor(weights)).sum().backward()
+    truth = TUBE.operator(light, diffraction=True, engine="reference").T(weights)
+    assert np.abs(samples.grad.numpy() - truth).max() < 1e-6 * truth.max()
+
+
+def test_what_moves_the_edges_of_an_aperture_is_not_learned():
+    tube = camera(vcc.Lens(F, diameter=0.7 * DIAMETER, name="main"), GREY, shape=(15, 19), pitch=8 * um)
+    with pytest.raises(vcc.InputError, match=r"no derivative to code.width.*what the aperture passes"):
+        CameraModule(tube, star(tube, side=41), ["code.width"], diffraction=True)
+    closed = tube.replace(code=vcc.Mask(CODE, width=DIAMETER, name="code"))
+    model = CameraModule(closed, star(closed, side=41), ["code.pattern"], diffraction=True)
+    with pytest.raises(vcc.InputError, match="no derivative to cells that transmit 0"):
+        model().sum().backward()
 
 
 def test_the_plan_states_the_error_out_of_focus():

@@ -34,6 +34,10 @@ FIRST_CELLS = 64
 """Cells of the first pass, which estimates the size of the image."""
 NO_LIGHT = 1e-6
 """Smaller means of patterns count as 0: they are rounding errors of differences of integrals."""
+JUMP = 8.0
+"""Boxes that are so many times wider than most may be due to a jump of a surface's slope."""
+ROUNDING = 1e-12
+"""Width of a box, metres, that is rounding."""
 NEARBY = 1e-3
 """Distance from a cell's centre, in cells, of the rays that measure its box on the sensor."""
 
@@ -126,7 +130,24 @@ class PointRays:
         if lost.any():  # a lens stops the neighbour of a ray that it lets pass: the one on the other side is taken
             rays[:, lost], _, still = self._differentials(places[lost], -NEARBY * cell)
             rays[1:, np.flatnonzero(lost)[still]] = rays[0, np.flatnonzero(lost)[still]]
-        return Spot(rays[0, :, :2], _box(rays), share / len(places))
+        return Spot(rays[0, :, :2], self._smooth_boxes(rays, places, cell), share / len(places))
+
+    def _smooth_boxes(self, rays: Array, places: Array, cell: Array) -> Array:
+        """The boxes of cells, (n, 2), without jumps of a surface's slope between the rays of a cell.
+
+        Over a distance of `NEARBY`, a jump looks like a box that is 1/`NEARBY` times too wide. The rays on the
+        other side show the surface without it. If they do not, and rays a whole cell away are nearer than such a
+        box says, the surface jumps there as well, or has a tip: the cell gets the box of others.
+        """
+        widths = _box(rays)
+        usual = np.maximum(np.quantile(widths, 0.99, axis=0), ROUNDING)
+        wide = (widths > JUMP * usual).any(axis=1)
+        if wide.any():
+            other = _box(self._differentials(places[wide], -NEARBY * cell)[0])
+            less = np.fmin(widths[wide], other)
+            whole = NEARBY * _box(self._differentials(places[wide], cell)[0])
+            widths[wide] = np.where((less > JUMP * usual) & (whole < less / 2), usual, less)
+        return widths
 
     def _differentials(self, places: Array, near: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Three rays a cell at the sensor: its middle, and one next to it along each axis; and the middle's light.

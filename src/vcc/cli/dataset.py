@@ -25,6 +25,7 @@ from vcc.cli.options import (
 )
 from vcc.cli.sweep import by_name, setting
 from vcc.dataset import make_dataset
+from vcc.dataset.making import Kind as Files
 from vcc.sweeps import Design
 from vcc.sweeps.design import Kind
 
@@ -153,6 +154,7 @@ def dataset(
     output: Output,
     count: Whole = 1000,
     per_shard: Whole = 100,
+    kind: Files = "webdataset",
     licence: Annotated[str | None, Parameter(metavar="TEXT")] = None,
     drawing: Drawing = Drawing(),
     truth: Truth = Truth(),
@@ -162,9 +164,10 @@ def dataset(
     """Make pairs of recordings and ground truth, for training.
 
     Args:
-        output: A new folder for WebDataset shards and the card; the same command resumes an interrupted run.
+        output: A new folder for the pairs and the card; the same command resumes an interrupted run.
         count: Number of pairs.
-        per_shard: Number of pairs in a shard.
+        per_shard: Number of pairs in a shard, which one task makes.
+        kind: Files of the pairs: `webdataset`, tar files; `zarr`, a Zarr group.
         licence: Of the data set, for its card.
     """
     who = executing.named
@@ -177,6 +180,7 @@ def dataset(
         **truth.options,
         "count": count,
         "per_shard": per_shard,
+        "kind": kind,
         "licence": licence or "",
     }
     with who.opened() as executor, progress("Recording pairs") as advance:

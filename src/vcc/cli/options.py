@@ -381,6 +381,13 @@ class Making(How):
             "smaller pieces take more time, because all rays are traced for each piece."
         ),
     ] = None
+    diffraction: Annotated[
+        bool,
+        Parameter(
+            help="Convolve the image of each band with the spread of a point in focus by the camera's stop, by "
+            'waves; needs a light field with wavelengths. See "Waves" in the docs for its error out of focus.'
+        ),
+    ] = False
 
 
 def _for_people(docstring: str) -> str:

@@ -108,12 +108,13 @@ def card_of(recipe: Recipe, per_shard: int, licence: str, first: Pair) -> dict[s
     return stated
 
 
-def as_text(card: dict[str, Any], recipe: Recipe) -> str:
+def as_text(card: dict[str, Any], recipe: Recipe, how_to_read: str) -> str:
     """The card for people, Markdown.
 
     Args:
         card: from `card_of`.
         recipe: of the pairs.
+        how_to_read: a sentence about the files.
     """
     rows = [
         f"| {name} | {'×'.join(map(str, each['shape']))} {each['dtype']} | {each['unit']} | {each['meaning']} |"
@@ -156,8 +157,7 @@ def as_text(card: dict[str, Any], recipe: Recipe) -> str:
         *_reference(recipe),
         *(f"- scene {number}: {name}" for number, name in enumerate(card["scenes"])),
         "",
-        "The .tar files are WebDataset shards: `webdataset.WebDataset(urls, shardshuffle=100).decode()`; or "
-        "`vcc.dataset.open_dataset(path)`.",
+        f"{how_to_read} Or `vcc.dataset.open_dataset(path)`, with either kind of files.",
         "",
     ]
     return "\n".join(lines)

@@ -15,8 +15,12 @@ from vcc.base import checks
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded, reading
-from vcc.dataset.shards import Shards, shards_at
+from vcc.base.reading import check_path, expanded, read_bytes, read_json, reading
+from vcc.dataset.card import FORMAT_VERSION
+from vcc.dataset.destination import CARD, Destination
+from vcc.dataset.recipe import MOST_PAIRS
+from vcc.dataset.shards import Shards
+from vcc.dataset.zarr_group import GROUP, ZarrGroup
 
 Numbers = Literal["radiance", "digital"]
 
@@ -36,7 +40,7 @@ class Pairs(Brief, Sequence[dict[str, Any]]):
             ``"digital"``: the digital numbers, as stored.
     """
 
-    disk: Shards
+    disk: Destination
     numbers: Numbers = "radiance"
 
     @property
@@ -106,7 +110,7 @@ def open_dataset(path: str | PathLike[str], numbers: Numbers = "radiance") -> Pa
         InputError: no data set, an unfinished one, a damaged card, or one of a newer version.
     """
     checks.one_of("numbers", numbers, get_args(Numbers))
-    disk = shards_at(expanded(path))
+    disk = destination_at(expanded(path))
     left = disk.left()
     if left:
         raise InputError(
@@ -114,3 +118,35 @@ def open_dataset(path: str | PathLike[str], numbers: Numbers = "radiance") -> Pa
             "make_dataset resumes"
         )
     return Pairs(disk, numbers)
+
+
+def destination_at(path: Path) -> Destination:
+    """The data set in a folder.
+
+    Raises:
+        InputError: none is there, or its card is damaged or of a newer version.
+    """
+    check_path(path, "data set")
+    file = path / CARD
+    if not file.is_file():
+        raise InputError(
+            f"{path} is no data set of vcc: it contains no {CARD}. Give the folder of one, or a new name"
+        )
+    card = read_json(read_bytes(file), str(file))
+    counts = [card.get(name) for name in ("format_version", "pairs", "pairs_per_shard", "shards")]
+    if not all(type(each) is int and each > 0 for each in counts):
+        raise InputError(f"{file} is not the card of a data set, or is damaged: its counts are {counts}")
+    version, pairs, per_shard, shards = (each or 0 for each in counts)
+    if version > FORMAT_VERSION:
+        raise InputError(
+            f"{file} has format_version {version}, and this vcc reads {FORMAT_VERSION}: use a newer vcc"
+        )
+    arrays = card.get("arrays")
+    stated = isinstance(arrays, dict) and all(
+        isinstance(each, dict) and "shape" in each for each in arrays.values()
+    )
+    stated = stated and "recording" in arrays and isinstance(card.get("numbers"), dict)  # type: ignore[operator]
+    if shards != -(-pairs // per_shard) or pairs > MOST_PAIRS or not stated:
+        raise InputError(f"{file} is damaged: pairs, shards and arrays do not fit together")
+    made: Destination = (ZarrGroup if (path / GROUP).is_dir() else Shards)(path, card)
+    return made

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from vcc.base import checks
 from vcc.base.describe import Brief
@@ -17,13 +17,15 @@ from vcc.base.progress import Progress, tell
 from vcc.base.reading import expanded
 from vcc.camera import Camera
 from vcc.dataset.card import as_text, card_of
-from vcc.dataset.loading import Pairs, open_dataset
+from vcc.dataset.destination import Destination
+from vcc.dataset.loading import Pairs, destination_at, open_dataset
 from vcc.dataset.recipe import PIECES, Recipe
 from vcc.dataset.recording_pairs import Opened, Pair, Recorder
 from vcc.dataset.scenes import scenes_of
-from vcc.dataset.shards import Shards, shards_at
+from vcc.dataset.shards import Shards
+from vcc.dataset.zarr_group import ZarrGroup
 from vcc.fields.samples import InMemory
-from vcc.files.parts import check_name, clear_folder, clear_leftovers
+from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
 from vcc.plan.how import How
 from vcc.run.executors import Work, worker_pool
@@ -32,6 +34,8 @@ from vcc.store.attributes import difference, same
 from vcc.sweeps.design import Design, cameras_of
 
 MOST_PER_SHARD = 10**5
+Kind = Literal["webdataset", "zarr"]
+KINDS: dict[Kind, type[Destination]] = {"webdataset": Shards, "zarr": ZarrGroup}
 
 
 def make_dataset(
@@ -53,6 +57,7 @@ def make_dataset(
     psf_size: int = 31,
     seed: int = 0,
     per_shard: int = 100,
+    kind: Kind = "webdataset",
     licence: str = "",
     executor: Any = None,
     progress: Progress | None = None,
@@ -65,7 +70,7 @@ def make_dataset(
     executor. The same call resumes what was stopped.
 
     Args:
-        path: a new folder for WebDataset shards (tar files) and the card; or the same data set, unfinished.
+        path: a new folder for the pairs and the card; or the same data set, unfinished.
         cameras: one whose parameters vary, or several.
         scenes: one or several: stores and videos (paths, or open), whose frames are scenes; light fields in
             memory; renderers with cameras, ``(renderer, vcc.sources.CameraArray(...))``, which workers render.
@@ -88,6 +93,8 @@ def make_dataset(
         psf_size: pixels along a side of a point spread, odd.
         seed: of everything that is drawn.
         per_shard: number of pairs in a shard, the unit of work of executors.
+        kind: ``"webdataset"``: shards are tar files; ``"zarr"``: a Zarr group ``pairs.zarr`` in the folder, images
+            in chunks of one pair, numbers in chunks of one shard, and the card in its attributes.
         licence: of the data set, for its card.
         executor: makes shards: any `concurrent.futures.Executor`, or a ``dask.distributed.Client`` whose workers
             see the same disk; it stays open. Scenes in memory must take at most 64 MiB then. None makes one pair
@@ -109,6 +116,7 @@ def make_dataset(
     """
     path = expanded(path)
     checks.whole_number_between("per_shard", per_shard, 1, MOST_PER_SHARD, of="pairs")
+    checks.one_of("kind", kind, get_args(Kind))
     if not isinstance(licence, str):
         raise InputError(f'licence is text, such as "CC BY 4.0", not a {type(licence).__name__}')
     chosen = How.of(how, options)
@@ -136,21 +144,22 @@ def make_dataset(
                 check_portable(scene.source)
     with Notices().gathered():  # pair 0 is made again with its shard
         first = Shard(recipe, None).pairs([0])
-        card = card_of(recipe, per_shard, licence, next(first))
+        example = next(first)
+    card = card_of(recipe, per_shard, licence, example)
     if executor is not None:
         vars(_local).clear()  # the scene: workers open their own
     check_name(path)
     if not path.parent.is_dir():
         raise InputError(f"{path} cannot be made: there is no folder {path.parent}; make it first")
-    disk, remarks = Shards(path, card), Notices()
+    disk, remarks = KINDS[kind](path, card), Notices()
     lock = WriterLock(path)
     try:
         clear_leftovers(path, lock.patience)
         if os.path.lexists(path):
-            _check_same(shards_at(path), card)
-            clear_folder(path, lock.patience)
+            _check_same(destination_at(path), disk)
+            disk.clear(lock.patience)
         else:
-            disk.create(as_text(card, recipe), recipe.cameras[0])
+            disk.create(as_text(card, recipe, disk.how_to_read), recipe.cameras[0], example)
         _run(Shard(recipe, disk), executor, remarks, progress)
     except (InputError, KeyboardInterrupt) as error:
         if not os.path.lexists(path):
@@ -175,12 +184,18 @@ def _several(name: str, given: Any, kind: Any) -> tuple[Any, ...]:
     return tuple(given)
 
 
-def _check_same(there: Shards, card: dict[str, Any]) -> None:
-    """Raise `InputError` unless a data set has the same card."""
+def _check_same(there: Destination, wanted: Destination) -> None:
+    """Raise `InputError` unless a data set has the same card and kind of files."""
+    card = wanted.card
     if card["description"] is None:
         raise InputError(
             f"{there.path} is there already, and a data set of cameras with Python functions cannot be resumed, "
             "because functions cannot be compared: remove it, or choose another name"
+        )
+    if there.kind != wanted.kind:
+        raise InputError(
+            f"{there.path} is a data set of kind {there.kind!r}, not {wanted.kind!r}: give kind={there.kind!r}, "
+            "or choose another name"
         )
     if not same(there.card, card):
         raise InputError(
@@ -226,7 +241,7 @@ class Shard(Brief):
     """
 
     recipe: Recipe
-    disk: Shards | None
+    disk: Destination | None
 
     def pairs(self, numbers: Sequence[int]) -> Iterator[Pair]:
         """Pairs with these numbers, in order; a scene is opened once for neighbours."""

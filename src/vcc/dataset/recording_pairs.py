@@ -18,18 +18,16 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError, ResultWarning
 from vcc.camera import Camera
 from vcc.dataset.recipe import Drawn, Recipe
-from vcc.fields.disparity import Disparities
-from vcc.fields.grid import ALL, Grid
+from vcc.fields.grid import Grid
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.plan.depth_rule import on_sensor
 from vcc.recording import expose_image
 from vcc.run.bands import response_matrix
+from vcc.run.by_depth import through_pinhole
 
 Arrays = dict[str, NDArray[Any]]
-PINHOLE = 1e-4
-"""Size of the pinhole of the sharp image, as a share of the spacing of views: its blur is as much smaller."""
 WHITE_SIDE, WHITE_SHARE = 8, 0.5
 """The image of a uniform scene is measured with so many large pixels along a side, which cover the middle of the
 sensor over this share of a window's sides."""
@@ -72,19 +70,7 @@ class Opened(Brief):
         """The light field of a pinhole in the middle of the middle view: all of the scene is sharp through it."""
         j, i = self.grid.middle_view
         values = to_numpy(self.light_field[j : j + 1, i : i + 1].values)
-        frame = self.grid.frame @ Affine.translation(i, j, 0, 0) @ Affine.scaling(PINHOLE, PINHOLE, 1, 1)
-        grid = replace(
-            self.grid,
-            shape=values.shape,
-            kind=values.dtype,
-            frame=frame,
-            extent=(1.0, 1.0),
-            beyond=ALL,
-            disparity_range=None,
-            disparities=Disparities(),
-            filling=None,
-        )
-        return LightField.of(values, grid)
+        return LightField.of(values, replace(through_pinhole(self.grid), kind=values.dtype))
 
     @property
     @cached
@@ -198,7 +184,8 @@ class Recorder(Brief):
         )
         with _one_thread, warnings.catch_warnings():  # filters belong to all threads
             warnings.simplefilter("ignore", ResultWarning)
-            found = camera.replace(sensor=few).capture(scene.white, self.recipe.how).to_numpy()
+            how = replace(self.recipe.how, diffraction=bool(self.recipe.how.diffraction))  # it has no depths
+            found = camera.replace(sensor=few).capture(scene.white, how).to_numpy()
         means = [float(each) for each in np.atleast_1d(found.mean(axis=(0, 1), dtype=np.float64))]
         if min(means) <= 0:
             raise InputError("no light of a uniform scene reaches the middle of the sensor: leave this camera out")

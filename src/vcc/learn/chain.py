@@ -28,6 +28,7 @@ from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.rays.edges import edges_that_cut
 from vcc.plan.rays.model import Rays
+from vcc.plan.stop_diffraction import aperture_moves
 from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
@@ -38,6 +39,8 @@ STEP = 1e-5
 """Step of the differences, relative to a change of 1 (`vcc.learn.scales`): it moves light by 1e-4 pixels."""
 REVEALING = 1e-4
 """Likewise, the step that reveals all dependent numbers."""
+APERTURE = 1e-2
+"""Likewise, the step that reveals edges that move across the points of an aperture."""
 MOST_BY_DIFFERENCES = 400
 """The largest size of a parameter that is differentiated by differences, which need two plans per number."""
 
@@ -84,6 +87,7 @@ class Chain:
         self._form: tuple[tuple[str, tuple[int, ...]], ...] | None = None
         self._check_sizes()
         self._check_edges({})
+        self._check_aperture()
 
     def plan(self, values: Values | None = None) -> Plan:
         """The plan for given values of the parameters.
@@ -256,6 +260,29 @@ class Chain:
                     f"there is no derivative to {name} ({owner}): it moves rays across {', '.join(cut)}, a hard "
                     "edge that each ray either passes or not. Do not learn it, or replace the edge by a pattern "
                     "that falls off smoothly"
+                )
+
+    def _check_aperture(self) -> None:
+        """Raise an error for parameters that move the edges of an aperture whose diffraction is computed."""
+        if not self.how.diffraction:
+            return
+        kernels = {name for name in self._at({}).numbers if name.endswith(".kernel")}
+        for name in self.names:
+            made = self._at({})
+            if any(kernels & set(linear.numbers(made.plan)) for linear in made.linear(name)):
+                continue
+            here, step = read(self.train, name), APERTURE * scale(self.train, name)
+            for moved in (here + step, here - step):
+                try:
+                    train = put(self.train, {name: moved})
+                except InputError:  # at a limit
+                    continue
+                if not aperture_moves(self.seen(self.train), self.seen(train)):
+                    break
+                raise InputError(
+                    f"there is no derivative to {name} ({parameter(self.train, name).owned_by}) with "
+                    "diffraction=True: it changes what the aperture passes at the points of its diffraction. "
+                    "Do not learn it, or leave diffraction out. The cells of a mask can be learned"
                 )
 
 

@@ -109,7 +109,8 @@ class Paths(Brief):
             seen = partial(_seen, bands[channels[0]], ways[0], counts[channels[0]])
             there = seen(moved)
             own = [name for name in names if name in fixed or seen(without[name]) != there]
-            paths.append(Path.of(Chain(train, grid, how, own, seen), channels, ways))
+            of_band = grid if grid.channels is None else grid.of_channels(channels)
+            paths.append(Path.of(Chain(train, of_band, how, own, seen), channels, ways))
         made = cls(train, grid, names, paths, counts)
         shares = made._shares(moved)
         mixed_by = [name for name in names if name in fixed or _differ(made._shares(without[name]), shares)]

@@ -87,7 +87,7 @@ class Work:
         # Rounded: estimates of disparity differ in the last digits between machines.
         seen = disparities and [round(float(each), 3) for each in disparities]
         bands = [grid.wavelengths] if self.camera.depends_on_bands else []
-        left_out = (*OF_THE_RUN, "seed", "diffraction")  # the last is always False here
+        left_out = (*OF_THE_RUN, "seed", *([] if how.diffraction else ["diffraction"]))
         decisive = [field.name for field in fields(How) if field.name not in left_out]
         return {
             "camera": _reported(self.camera),

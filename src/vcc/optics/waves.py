@@ -11,6 +11,7 @@ aberrations, and at any defocus for a Gaussian stop.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import CellDeflection
 from vcc.optics.real_rays import entrance_box, light_stages
 from vcc.optics.train import Stage, Train
+from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
 
@@ -46,6 +48,7 @@ class Pupil(Brief):
         steps: (x, y) from point to point on the entrance plane, metres.
         sensor_from_slope: B, 2×2, metres.
         focus: V, 2×2, 1/m: rays of the point in focus have slopes V·u plus a constant, A + B·V = 0.
+        middle: (x, y) of the middle of the points on the entrance plane, metres.
     """
 
     amplitude: Array
@@ -53,6 +56,7 @@ class Pupil(Brief):
     steps: tuple[float, float]
     sensor_from_slope: Array
     focus: Array
+    middle: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def of(cls, train: Train, at: tuple[float, float] = (0.0, 0.0), points: int = POINTS) -> Pupil:
@@ -68,29 +72,13 @@ class Pupil(Brief):
                 entrance plane, or elements whose diffraction is no convolution of the image: arrays,
                 transmission by direction.
         """
-        to_sensor = train.arriving_at_sensor
-        by_place, by_slope = to_sensor.linear[:2, :2], to_sensor.linear[:2, 2:]
-        if abs(np.linalg.det(by_slope)) <= SINGULAR * np.abs(by_slope).max() ** 2:
-            raise InputError(
-                "diffraction: the sensor lies at an image of the entrance plane, where light of all slopes "
-                "meets in one place: leave diffraction out"
-            )
-        _check_elements(train)
-        focus = np.asarray(-np.linalg.solve(by_slope, by_place), dtype=np.float64)
-        place = np.asarray(train.sensor.decentre) + np.asarray(at)
-        chief = np.array([0.0, 0.0, *np.linalg.solve(by_slope, place - to_sensor.offset[:2])])
-        per_place = np.vstack([np.eye(2), focus])
-        of_box = _box_of_rays if has_real_lens(train) else _box
-        centre, half = of_box(train, chief, per_place)
-        if any(half <= 0):
-            raise InputError("diffraction: the camera's stops leave no opening to light of a point in focus")
-        x, y = (centre[axis] + half[axis] * ((np.arange(points) + 0.5) * 2 / points - 1) for axis in (0, 1))
-        places = np.stack(np.meshgrid(x, y), axis=-1)
-        light, landing = _traced(train, chief + places @ per_place.T)
+        rays, steps, by_slope, focus = _rays_of_focus(train, at, points)
+        x, y = rays[..., :2].mean(axis=(0, 1))
+        light, landing = _traced(train, rays)
         if not light.any():
             raise InputError("diffraction: no light of a point in focus passes the camera's stops")
-        steps = float(2 * half[0] / points), float(2 * half[1] / points)
-        return cls(np.sqrt(light), landing - place, steps, by_slope, focus)
+        place = np.asarray(train.sensor.decentre) + np.asarray(at)
+        return cls(np.sqrt(light), landing - place, steps, by_slope, focus, (float(x), float(y)))
 
     @property
     def points(self) -> int:
@@ -117,6 +105,36 @@ class Pupil(Brief):
             wavelength: metres.
         """
         return self._looked_up(self._lags, frequencies, wavelength)
+
+    def otf_back(self, frequencies: Array, wavelength: float, weights: Array) -> Array:
+        """The gradient of Σ weights · `otf` with respect to the amplitude, (n, n).
+
+        Args:
+            frequencies: as for `otf`, (..., 2).
+            wavelength: metres.
+            weights: (...).
+        """
+        from scipy.fft import ifftshift, irfft2, rfft2
+
+        n = 2 * self.points
+        shift = (wavelength * frequencies @ self.sensor_from_slope / np.array(self.steps) + self.points).reshape(
+            -1, 2
+        )
+        low = np.floor(shift).astype(np.intp)
+        part = shift - low
+        scattered = np.zeros(n * n)
+        inside = ((shift >= 0) & (shift <= n - 1)).all(axis=-1)  # beyond, the OTF is 0
+        for dy in (0, 1):
+            for dx in (0, 1):
+                share = np.abs(1 - dx - part[:, 0]) * np.abs(1 - dy - part[:, 1]) * weights.reshape(-1) * inside
+                index = np.clip(low[:, 1] + dy, 0, n - 1) * n + np.clip(low[:, 0] + dx, 0, n - 1)
+                scattered += np.bincount(index, share, n * n)
+        of_lags = scattered.reshape(n, n)
+        of_lags[self.points, self.points] -= (of_lags * self._lags).sum()  # lags are over that at 0
+        of_lags /= (self.amplitude**2).sum()
+        # Σₖ g[k]·Σₓ a[x]·a[x + k] has the gradient g correlated and convolved with a.
+        found = irfft2(2 * rfft2(self.amplitude, (n, n)) * rfft2(ifftshift(of_lags)).real, (n, n))
+        return np.asarray(found[: self.points, : self.points])
 
     def _looked_up(
         self, lags: NDArray[np.floating], frequencies: Array, wavelength: float, order: int = 1
@@ -176,6 +194,37 @@ class Pupil(Brief):
             self._looked_up(lags.real, frequencies, wavelength, 3)
             + 1j * self._looked_up(lags.imag, frequencies, wavelength, 3)
         )
+
+
+def through_cells(train: Train, cells: Cells, points: int) -> tuple[NDArray[np.int64], Array]:
+    """Where light of the pupil's points crosses a mask of cells, and what the rest of the camera passes of it.
+
+    Args:
+        train: whose masks include these cells; see `has_cells`.
+        cells: the array of one mask.
+        points: as in `Pupil.of`.
+
+    Returns:
+        (index of the cell, row by row, −1 beside the array; share that all else passes), each (n, n).
+    """
+    rays = _rays_of_focus(train, (0.0, 0.0), points)[0]
+    places = np.full(rays.shape[:-1], -1)
+
+    def crossed(stage: Stage, arriving: Array) -> Array:
+        if stage.faces.pattern is not cells:
+            return stage.share(arriving)
+        x, y = np.moveaxis(arriving[..., :2] - np.asarray(stage.element.decentre), -1, 0)
+        row, column = cells.cells_at(x, y)
+        places[...] = np.where((row >= 0) & (column >= 0), row * cells.values.shape[1] + column, -1)
+        return np.ones(places.shape)
+
+    rest, _ = _traced(train, rays, crossed)
+    return places, rest
+
+
+def has_cells(train: Train, cells: Cells) -> bool:
+    """Whether an array of cells (the same object) is the whole pattern of one element."""
+    return sum(stage.faces.pattern is cells for stage in train.stages) == 1
 
 
 def has_real_lens(train: Train) -> bool:
@@ -285,12 +334,43 @@ def _box_of_rays(train: Train, chief: Array, per_place: Array) -> tuple[Array, A
     return (low + high) / 2, (high - low) / 2
 
 
-def _traced(train: Train, rays: Array) -> tuple[Array, Array]:
-    """Of rays (..., 4) at the entrance plane: the light that passes, (...), and places on the sensor (..., 2)."""
+def _rays_of_focus(
+    train: Train, at: tuple[float, float], points: int
+) -> tuple[Array, tuple[float, float], Array, Array]:
+    """Rays (n, n, 4) of the point in focus, and ``steps``, ``sensor_from_slope`` and ``focus`` of its `Pupil`."""
+    to_sensor = train.arriving_at_sensor
+    by_place, by_slope = to_sensor.linear[:2, :2], to_sensor.linear[:2, 2:]
+    if abs(np.linalg.det(by_slope)) <= SINGULAR * np.abs(by_slope).max() ** 2:
+        raise InputError(
+            "diffraction: the sensor lies at an image of the entrance plane, where light of all slopes "
+            "meets in one place: leave diffraction out"
+        )
+    _check_elements(train)
+    focus = np.asarray(-np.linalg.solve(by_slope, by_place), dtype=np.float64)
+    place = np.asarray(train.sensor.decentre) + np.asarray(at)
+    chief = np.array([0.0, 0.0, *np.linalg.solve(by_slope, place - to_sensor.offset[:2])])
+    per_place = np.vstack([np.eye(2), focus])
+    of_box = _box_of_rays if has_real_lens(train) else _box
+    centre, half = of_box(train, chief, per_place)
+    if any(half <= 0):
+        raise InputError("diffraction: the camera's stops leave no opening to light of a point in focus")
+    x, y = (centre[axis] + half[axis] * ((np.arange(points) + 0.5) * 2 / points - 1) for axis in (0, 1))
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    steps = float(2 * half[0] / points), float(2 * half[1] / points)
+    return np.asarray(chief + places @ per_place.T), steps, by_slope, focus
+
+
+def _traced(
+    train: Train, rays: Array, share: Callable[[Stage, Array], Array] = Stage.share
+) -> tuple[Array, Array]:
+    """Of rays (..., 4) at the entrance plane: the light that passes, (...), and places on the sensor (..., 2).
+
+    ``share`` is the light that a stage's transmission passes, of arriving rays.
+    """
     light = np.ones(rays.shape[:-1])
     for stage in light_stages(train):
         rays = np.asarray(stage.approach(rays))
-        light = light * stage.share(rays)
+        light = light * share(stage, rays)
         # Dark rays go on as well: the path is summed across dark cells.
         bent, passed = stage.crossed(rays)
         rays = np.where(passed[..., None] > 0, bent, rays)

@@ -9,6 +9,7 @@ from typing import Literal
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.values import content
 from vcc.fields.grid import Grid
 from vcc.optics.bands import refuse
 from vcc.optics.train import Train
@@ -94,6 +95,8 @@ class Choices(Brief):
         plain: choices of the additional plan for the original views; else None.
         footprints: of a plan by footprints; else None.
         rays: of a plan by rays; else None.
+        diffraction: half width of the kernels, notes and cautions; None without diffraction.
+        widened: choices of the plan for the larger sensor that the diffraction needs; else None.
     """
 
     missing: tuple[Missing, str]
@@ -106,6 +109,10 @@ class Choices(Brief):
     plain: Choices | None = choice("views as they are")
     footprints: FootprintChoices | None = choice("")
     rays: RayChoices | None = choice("")
+    diffraction: tuple[int, tuple[str, ...], tuple[str, ...]] | None = choice(
+        "the size of the stop's diffraction", lambda one, other: one[0] == other[0]
+    )
+    widened: Choices | None = choice("")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -150,11 +157,10 @@ class _Making:
                 "column)"
             )
         refuse(train, "one plan for all channels")
-        if how.diffraction and follow is not None:
+        if how.diffraction == "depth":
             raise InputError(
-                "diffraction=True is not supported while a camera learns: the derivative of the stop's "
-                "diffraction to its parameters is not available. For gradients to the samples, capture a light "
-                "field of tensors, or use camera.operator(light_field, diffraction=True)"
+                "diffraction='depth' follows the disparities of a light field, and belongs to images alone: use "
+                "camera.capture, or diffraction=True here"
             )
         self.train, self.grid, self.how = train, grid, how
         self.chosen, self.follow, self.parts = choices, follow, parts
@@ -162,6 +168,20 @@ class _Making:
     @property
     def choices(self) -> Choices:
         """All choices."""
+        if self.how.diffraction:
+            inner = self.widened.choices
+            return Choices(
+                missing=self.choose_missing,
+                elements=self.elements,
+                why_rays=inner.why_rays,
+                views_between=None,
+                dense=None,
+                plain=None,
+                footprints=None,
+                rays=None,
+                diffraction=self.choose_diffraction,
+                widened=inner,
+            )
         by, dense = self.by, self.how.between_views == "depth"
         return Choices(
             elements=self.elements,
@@ -172,6 +192,8 @@ class _Making:
             footprints=by.choices if isinstance(by, ByFootprints) else None,
             rays=by.choices if isinstance(by, ByRays) else None,
             missing=self.choose_missing,
+            diffraction=None,
+            widened=None,
         )
 
     @property
@@ -182,7 +204,10 @@ class _Making:
     @property
     def linears(self) -> tuple[Linear, ...]:
         """The parameters of the plan that are linear in parameters of elements."""
-        return self.by.linears
+        if not self.how.diffraction:
+            return self.by.linears
+        kernel = self.diffraction.by_cells(len(self.widened.plan.after))
+        return (*self.widened.linears, kernel)
 
     @property
     @cached
@@ -297,14 +322,43 @@ class _Making:
         return replace(plan, views_between=between, in_focus=focused, notes=(*plan.notes, why), cautions=cautions)
 
     @property
+    @cached
+    def diffraction(self) -> StopDiffraction:
+        """The stop's diffraction."""
+        chosen = self.chosen.diffraction if self.chosen else None
+        half_width = None if chosen is None else chosen[0]
+        found = self.parts.part(
+            "diffraction",
+            lambda: content((self.train, self.grid.wavelengths, half_width)),
+            lambda: StopDiffraction.of(self.train, self.grid, half_width),
+        )
+        return replace(found, train=self.train)  # equal, but learned cells are found by identity
+
+    @property
+    @cached
+    def choose_diffraction(self) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
+        """Half width of the kernels, and notes and cautions on their error."""
+        if self.chosen and self.chosen.diffraction:
+            return self.chosen.diffraction
+        seen = self.how.scene_distance
+        known = seen is not None or self.grid.disparity_range is not None
+        return self.diffraction.half_width, *self.diffraction.of_depths(
+            vergences(self.grid, seen) if known else None
+        )
+
+    @property
+    @cached
+    def widened(self) -> _Making:
+        """The stages of the plan for the larger sensor that the diffraction needs."""
+        how, chosen = replace(self.how, diffraction=False), self.chosen.widened if self.chosen else None
+        return _Making(self.diffraction.widened, self.grid, how, chosen, self.follow, self.parts)
+
+    @property
     def _diffracted(self) -> Plan:
         """The plan of the image on a larger sensor, which is then convolved and cut."""
-        added = StopDiffraction.of(self.train, self.grid)
-        how = replace(self.how, diffraction=False)
-        plan = _Making(added.widened, self.grid, how, parts=self.parts).plan
+        plan, added = self.widened.plan, self.diffraction
         after = (*plan.after, added.operator, OnSensor(added.half_width))
-        known = how.scene_distance is not None or self.grid.disparity_range is not None
-        notes, warned = added.of_depths(vergences(self.grid, how.scene_distance) if known else None)
+        _, notes, warned = self.choose_diffraction
         return replace(
             plan,
             sensor_shape=self.train.sensor.shape,

@@ -42,7 +42,7 @@ class Options(TypedDict, total=False):
     engine: EngineName | None
     threads: int | None
     memory_limit: int | None
-    diffraction: bool
+    diffraction: bool | Literal["depth"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,6 +82,9 @@ class How(Value, Shown):
             because all rays are traced for each piece.
         diffraction: convolve the image of each band with the spread of a point in focus by the camera's stop, by
             waves; needs a light field with wavelengths. See "Waves" in the docs for its error out of focus.
+            ``"depth"``, for images only (not operators, plans and learning): then add what waves change at the
+            depth of each part, by the disparities of the middle view (estimated if the light field has none) or
+            ``scene_distance``.
 
     Raises:
         InputError: an unsupported value, named together with the supported ones.
@@ -98,7 +101,7 @@ class How(Value, Shown):
     engine: EngineName | None = None
     threads: int | None = None
     memory_limit: int | None = None
-    diffraction: bool = False
+    diffraction: bool | Literal["depth"] = False
 
     def __post_init__(self) -> None:
         checks.one_of("method", self.method, get_args(Method))
@@ -124,8 +127,8 @@ class How(Value, Shown):
             checks.one_of("engine", self.engine, get_args(EngineName))
         if self.threads is not None:
             checks.whole_number_between("threads", self.threads, 1)
-        if not isinstance(self.diffraction, bool):
-            raise InputError(f"diffraction is True or False, not {self.diffraction!r}")
+        if not isinstance(self.diffraction, bool) and self.diffraction != "depth":
+            raise InputError(f"diffraction is True, False or 'depth', not {self.diffraction!r}")
         if self.diffraction and self.between_views == "depth":
             raise InputError(
                 "diffraction=True and between_views='depth' do not go together: the image is then a mixture of "

@@ -15,8 +15,11 @@ from vcc.base.units import short
 from vcc.fields.grid import Grid
 from vcc.optics.band import STATE_THEM
 from vcc.optics.train import Train
-from vcc.optics.waves import POINTS, Pupil, has_real_lens, point_spreads
+from vcc.optics.waves import POINTS, Pupil, has_cells, has_real_lens, point_spreads, through_cells
+from vcc.plan.following import Linear
 from vcc.plan.operators import BlurByChannel
+from vcc.shapes.mean_back import is_values
+from vcc.shapes.patterns import Cells
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,9 @@ LARGEST_ESTIMATE = 401
 """Largest side, pixels, of the images of points by which they are estimated."""
 HALO = 100
 """Largest margin around the blur by rays in them, pixels; light beyond comes in again, in all images alike."""
+IN_FOCUS_ONLY = "diffraction=True is exact for points in focus without aberrations only"
+SAME_LIGHT = 1e-6
+"""Share of a pupil's light that rounding may change; one of 512² points is more."""
 WORTH_A_WARNING = 0.2
 """Share of a point's light in wrong pixels above which an image comes with a warning."""
 
@@ -46,19 +52,22 @@ class StopDiffraction(Brief):
         train: the camera as these bands meet it.
         wavelengths: of the bands, metres.
         pupil: of the middle of the sensor.
+        fixed_half_width: of the kernels, if chosen before; None computes it.
     """
 
     train: Train
     wavelengths: tuple[float, ...]
     pupil: Pupil
+    fixed_half_width: int | None = None
 
     @classmethod
-    def of(cls, train: Train, grid: Grid) -> StopDiffraction:
+    def of(cls, train: Train, grid: Grid, half_width: int | None = None) -> StopDiffraction:
         """The stop's diffraction for a light field.
 
         Args:
             train: the camera as the light field's bands meet it.
             grid: of the light field.
+            half_width: of the kernels, chosen for a nearby camera, which was checked; None chooses and checks.
 
         Raises:
             InputError: a light field without wavelengths, a camera without a stop or with elements that
@@ -68,9 +77,8 @@ class StopDiffraction(Brief):
             raise InputError(
                 f"diffraction depends on the wavelength, and the light field states none: {STATE_THEM}"
             )
-        points = ESTIMATED if has_real_lens(train) else POINTS
-        made = cls(train, grid.wavelengths, Pupil.of(train, points=points))
-        if made.change > SAME:
+        made = cls(train, grid.wavelengths, Pupil.of(train, points=_points(train)), half_width)
+        if half_width is None and made.change > SAME:
             raise InputError(
                 f"diffraction: over the sensor, the stop's diffraction puts {made.change:.0%} of a point's light "
                 f"in other places, and one convolution stands for at most {SAME:.0%}: leave diffraction out, "
@@ -106,6 +114,8 @@ class StopDiffraction(Brief):
     @property
     def half_width(self) -> int:
         """Of the kernels, pixels: all but `BEYOND` of the light of the longest wavelength, or `WIDEST`."""
+        if self.fixed_half_width is not None:
+            return self.fixed_half_width
         pitch = min(self.train.sensor.pitches)
         reach = self.pupil.falloff(max(self.wavelengths)) / (2 * math.pi * BEYOND * pitch)
         return min(max(2, math.ceil(reach)), WIDEST)
@@ -124,14 +134,49 @@ class StopDiffraction(Brief):
         Its transform is the optical transfer function up to half a cycle per pixel. Light that falls beyond its
         border comes in from the other side: no light is lost.
         """
-        size = 2 * self.half_width + 1
-        cycles = np.fft.fftfreq(size)
-        frequencies = np.stack(np.meshgrid(cycles, cycles), axis=-1) @ self.train.sensor.frame.inverse().linear
         made = [
-            np.fft.fftshift(np.fft.ifft2(self.pupil.otf(frequencies, wavelength)).real)
+            np.fft.fftshift(np.fft.ifft2(self.pupil.otf(self._frequencies, wavelength)).real)
             for wavelength in self.wavelengths
         ]
         return np.stack(made, axis=-1)
+
+    @property
+    def _frequencies(self) -> Array:
+        cycles = np.fft.fftfreq(2 * self.half_width + 1)
+        return np.stack(np.meshgrid(cycles, cycles), axis=-1) @ self.train.sensor.frame.inverse().linear
+
+    # --- the derivative
+
+    def by_cells(self, place: int) -> Linear:
+        """The derivative, here, of the kernel with respect to the cells of a mask.
+
+        Args:
+            place: of `operator` in ``plan.after``.
+        """
+        return Linear(
+            lambda thing, field: is_values(thing, field) and has_cells(self.train, thing),
+            lambda plan: (f"after[{place}].kernel",),
+            lambda cells, weights: self._back(cells, weights[0]),
+        )
+
+    def _back(self, cells: Cells, weights: Array) -> Array:
+        """The gradient of Σ weights · `kernel` with respect to the values of cells."""
+        size = len(weights)
+        of_amplitude = np.zeros(self.pupil.amplitude.shape)
+        for n, wavelength in enumerate(self.wavelengths):
+            of_otf = np.fft.fft2(np.fft.ifftshift(weights[..., n])).real / size**2
+            of_amplitude += self.pupil.otf_back(self._frequencies, wavelength, of_otf)
+        cell, rest = through_cells(self.train, cells, self.pupil.points)
+        lit = (cell >= 0) & (rest > 0)
+        value = cells.values.reshape(-1)[cell[lit]]
+        if not value.all():
+            raise InputError(
+                "the diffraction of an aperture has no derivative to cells that transmit 0: the amplitude of "
+                "light is the root of the transmission. Keep learned cells above 0, for example by sigmoid_mask"
+            )
+        # The amplitude is the root of value · rest.
+        found = np.bincount(cell[lit], of_amplitude[lit] * np.sqrt(rest[lit] / value) / 2, cells.values.size)
+        return np.asarray(found.reshape(cells.values.shape), np.float64)
 
     def errors(self, vergence: float) -> tuple[float, float] | None:
         """What is wrong with the image of a point at 1/Z in the longest wavelength, compared with waves alone.
@@ -187,7 +232,7 @@ class StopDiffraction(Brief):
             if convolved > worst:
                 worst, warned = (
                     convolved,
-                    f"diffraction=True is exact for points in focus without aberrations only: {words}",
+                    f"{IN_FOCUS_ONLY}: {words}; diffraction='depth' follows depths",
                 )
         return tuple(notes), (warned,) if warned else ()
 
@@ -215,6 +260,20 @@ class StopDiffraction(Brief):
             f"{_bands(self.wavelengths)}, {size}×{size} pixels of {short(min(self.train.sensor.pitches))}, the "
             f"middle's for all pixels{varies}; {self.beyond:.2%} of the light belongs beyond and is kept within",
         )
+
+
+def _points(train: Train) -> int:
+    """Points along each side of a camera's pupil."""
+    return ESTIMATED if has_real_lens(train) else POINTS
+
+
+def aperture_moves(train: Train, moved: Train) -> bool:
+    """Whether the light at fixed points across the pupil differs between two cameras.
+
+    If it does, the kernel is no smooth function of what differs: points cross the edges of the aperture.
+    """
+    one, other = (Pupil.of(each, points=_points(each)).amplitude for each in (train, moved))
+    return bool(np.abs(one - other).sum() > SAME_LIGHT * one.sum())
 
 
 def _bands(wavelengths: tuple[float, ...]) -> str:

@@ -183,7 +183,8 @@ class Work(Brief):
         if camera.depends_on_bands:  # each camera has several plans, and shares no work with others
             return 1
         pixels = math.prod(camera.sensor.shape) * channels
-        samples = camera.compile(self.light_field, self.how).samples_touched * channels
+        how = replace(self.how, diffraction=bool(self.how.diffraction))  # a plan has one kernel
+        samples = camera.compile(self.light_field, how).samples_touched * channels
         least = 1 if self.light_field.whole() is not None else SHARE_A_READING
         within_time = max(BATCH_SAMPLES // max(samples, 1), least)
         return int(max(1, min(MOST_TOGETHER, BATCH_BYTES // (4 * pixels), within_time)))

@@ -60,9 +60,9 @@ def _video(make: Maker) -> Bomb:
     return Bomb(make, "v.zarr", readers.light_field_video)
 
 
-def _dataset(name: str, old: str, new: str) -> Bomb:
+def _dataset(name: str, old: str, new: str, seed: Maker = seeds.dataset) -> Bomb:
     """A data set with something else in a file."""
-    change = changed(seeds.dataset, f"pairs/{name}", lambda data: data.replace(old.encode(), new.encode()))
+    change = changed(seed, f"pairs/{name}", lambda data: data.replace(old.encode(), new.encode()))
     return Bomb(change, "pairs", readers.dataset)
 
 
@@ -74,6 +74,8 @@ LIST = b'{"zarr_format": 3, "node_type": "group", "attributes": [1]}'
 BOMBS = {
     "dataset 10^12 shards": _dataset("dataset.json", '"pairs": 3', f'"pairs": {2 * 10**12}'),
     "dataset shape 1e12": _dataset("pairs-000000.tar", "(6, 8, 3), } ", "(1000000000,)}"),
+    "dataset zarr 1e12": _dataset("pairs.zarr/sharp/zarr.json", "8,", f"{10**12},", seeds.zarr_dataset),
+    "dataset zarr numbers": _dataset("pairs.zarr/gain/zarr.json", "3\n", f"{10**12}\n", seeds.zarr_dataset),
     "zarr shape 1e12": _store(_claims([10**3, 10**3, 10**3, 10**3, 3])),
     "zarr 10^9 views": _store(_claims(BILLION)),
     "zarr 10^9 views, info": Bomb(_claims(BILLION), "s.zarr", readers.info, refused=False),
