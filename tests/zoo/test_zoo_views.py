@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-
 from scipy.ndimage import convolve, shift
 
 import vcc
@@ -47,7 +46,7 @@ def plane(blur: float) -> Scene:
 
 
 def cells(blur: float) -> np.ndarray:
-    """Its means over cells: moved waves, whose contrast falls by the mean over the cell's positions (Dirichlet)."""
+    """Its means over cells: moved waves, whose contrast falls by the mean over a cell's positions (Dirichlet)."""
     places = np.arange(CELLS) - (CELLS - 1) / 2
     fine = blur * (np.arange(5) - 2) / VIEWS / PERIOD
     contrast = 0.4 * math.prod(np.exp(2j * math.pi * part * fine).mean().real for part in (0.6, 0.8))
@@ -127,7 +126,7 @@ def test_noise_of_views_follows_from_electrons():
 
 
 def test_refocused_pictures_have_the_contrast_of_their_blur():
-    """A plane of blur b, focused where the blur is c: waves behind a box of |b − c| pixels, sinc((b − c)/period)."""
+    """A plane of blur b, focused where it is c: behind a box of |b − c| pixels, sinc((b − c)/period)."""
     truth = REFOCUSING.truth(plane(6.0))
     with Notices().gathered():  # 5 views are few for the farthest distance
         views = refocus(cells(6.0))
@@ -154,7 +153,7 @@ def test_a_picture_is_moved_by_its_depth():
         expected = shift(middle, (-6 / 5 * (row - 2), -6 / 5 * (column - 2)), order=1)
         assert np.abs(found[row, column] - expected)[20:-20, 20:-20].max() < 1e-6
     wrong, right = (np.mean((each - sharp)[20:-20, 20:-20] ** 2) for each in (values, middle))
-    assert right < wrong / 3
+    assert right < 0.7 * wrong  # deblurred, with noise and borders
 
 
 def test_own_cameras_and_scenes_that_do_not_fit_are_refused(tmp_path):

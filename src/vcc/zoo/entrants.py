@@ -45,7 +45,7 @@ class Exposure(Brief):
         camera: its optics and sensor.
         time: exposure time relative to that of the rules.
         filters: of the pixels, transmission 0 to 1 by band: (rows, columns, bands), or that broadcasts to it, as
-            the sensor shows it, upside down. None for none.
+            the sensor shows the scene. None for none.
     """
 
     camera: Camera

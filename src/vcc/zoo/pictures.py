@@ -15,7 +15,7 @@ from vcc.base.describe import Brief
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
-from vcc.zoo.bench import SHAPE, Kernels, calibrated, exposed
+from vcc.zoo.bench import Kernels, calibrated, exposed
 from vcc.zoo.decoders import Recorded
 from vcc.zoo.entrants import Entrant, Exposure
 from vcc.zoo.scenes import Scene
@@ -80,7 +80,7 @@ class Pictures(Brief):
     def light(self) -> float:
         """The light of all exposures, relative to the open camera with its whole exposure time."""
         return sum(
-            share * each.time * math.prod(image.shape) / math.prod(SHAPE)
+            share * each.time * math.prod(image.shape) / self.task.pixels
             for share, each, image in zip(self.shares, self.entrant.exposures, self.images, strict=True)
         )
 
@@ -103,6 +103,8 @@ class Pictures(Brief):
             )
         ]
         values = np.stack([values for values, _ in pairs])
+        if not self.task.inverted:
+            values = np.ascontiguousarray(values[:, ::-1, ::-1])
         squares = [noise**2 + sampling**2 for (_, noise), sampling in zip(pairs, self.samplings, strict=True)]
         return Recorded(
             values[0] if len(values) == 1 else values,

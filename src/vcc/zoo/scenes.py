@@ -257,5 +257,6 @@ def _declared(values: Array, disparity: float) -> LightField:
 
 
 def cropped(picture: Array, shape: tuple[int, int]) -> Array:
+    """The middle of a picture."""
     top, left = ((n - m) // 2 for n, m in zip(picture.shape, shape, strict=True))
     return picture[top : top + shape[0], left : left + shape[1]]

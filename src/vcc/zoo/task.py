@@ -66,7 +66,9 @@ class Task(Brief):
         shown: one picture of the same, (rows, columns) or (rows, columns, 3), 0 to 1.
         light_field: of a scene.
         white: radiance 1 everywhere, likewise.
-        reference: irradiance of white times the area of a pixel, of the camera whose light is 100 %.
+        reference: irradiance of white times the area of a pixel, of the open camera, whose light is 100 %.
+        pixels: of the open camera, that the scene fills.
+        inverted: whether sensors show the scene upside down.
         check: raises InputError for a camera of the user that does not follow the rules.
     """
 
@@ -84,6 +86,8 @@ class Task(Brief):
     light_field: Callable[[Scene], LightField] = field(default=lambda scene: scene.field)
     white: Callable[[], LightField] = white_field
     reference: float = REFERENCE
+    pixels: int = SHAPE[0] * SHAPE[1]
+    inverted: bool = True
     check: Callable[[Camera, str], None] = check_camera
 
     @property

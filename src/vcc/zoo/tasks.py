@@ -14,6 +14,7 @@ from vcc.zoo.bench import ALL_BLURS, BEYOND, BLUR, FOCUS, SIDE, SLOPE, calibrate
 from vcc.zoo.decoders import BLOCK
 from vcc.zoo.entrants import Entrant, codes, plates, with_controls
 from vcc.zoo.scenes import Scene
+from vcc.zoo.spectra import SPECTRUM
 from vcc.zoo.task import PSNR, SSIM, Measure, Task, picture_scores
 from vcc.zoo.views import LIGHT_FIELD, REFOCUSING
 
@@ -100,7 +101,7 @@ DEPTH = Task(
     shown=lambda distance: np.clip((_blur(distance) / BLUR + 1) / 2, 0, 1),
 )
 
-TASKS = {task.name: task for task in (EDOF, DEPTH, LIGHT_FIELD, REFOCUSING)}
+TASKS = {task.name: task for task in (EDOF, DEPTH, LIGHT_FIELD, REFOCUSING, SPECTRUM)}
 
 
 def task_named(name: str) -> Task:

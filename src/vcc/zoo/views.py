@@ -87,7 +87,7 @@ def plenoptic(lenslet: int) -> Camera:
 
 
 def heterodyne() -> Camera:
-    """A mask of cosines, whose shadow has the period of a pixel of a view, before fine pixels (Veeraraghavan 2007)."""
+    """Cosines before fine pixels; their shadow has the period of a view's pixel (Veeraraghavan et al. 2007)."""
     d, share = image_distance(FOCUS), PITCH / (SIDE + PITCH)
     mask = Mask(CosineSum(share * SIDE, (CELLS - 1) // 2), z=d * (1 - share), name="cosines")
     shape = (SHAPE[0] * CELLS, SHAPE[1] * CELLS)
