@@ -172,10 +172,10 @@ def its_views(recorded: Recorded) -> Array:
     views_in = _decoder_of(recorded.camera)
     if views_in is None:
         raise InputError("the camera has neither lenslets nor a mask of cosines: its picture holds no views")
-    return _on_pixels(views_in(recorded.values + PEDESTAL, recorded.camera) - _zero(recorded.camera))
+    return _on_pixels(views_in(recorded.values + PEDESTAL, recorded.camera)) - _zero(recorded.camera)
 
 
-def _decoder_of(camera: Camera) -> Callable[[Array, Camera], Array] | None:
+def _decoder_of(camera: Camera) -> Callable[[Array, Camera], LightField] | None:
     if any(isinstance(each, LensArray) for each in camera.elements):
         return _of_lenslets
     cosines = any(isinstance(each, Mask) and isinstance(each.pattern, CosineSum) for each in camera.elements)
@@ -194,10 +194,9 @@ def _of_apertures(recorded: Recorded) -> Array:
     return np.asarray(found).reshape(CELLS, CELLS, *SHAPE)
 
 
-def _of_lenslets(values: Array, camera: Camera) -> Array:
-    grid = LensletGrid.of_camera(camera).turned(camera.sensor.shape)
-    field = decode_plenoptic(values, camera=camera, views=CELLS, view_step=grid.pitch / CELLS, inverted=False)
-    return np.asarray(field.values, np.float64)
+def _of_lenslets(values: Array, camera: Camera) -> LightField:
+    step = LensletGrid.of_camera(camera).pitch / CELLS
+    return decode_plenoptic(values, camera=camera, views=CELLS, view_step=step, inverted=False)
 
 
 @lru_cache(maxsize=2)
@@ -209,10 +208,10 @@ def _calibration(camera: Camera) -> Array:
     return np.asarray(heterodyne_calibration(camera, light_field=field).to_numpy(), np.float64)
 
 
-def _of_carriers(values: Array, camera: Camera) -> Array:
+def _of_carriers(values: Array, camera: Camera) -> LightField:
     # The cosines pass a quarter of the light; white is 1 in the values, and irradiance in the decoder.
     irradiance = 0.25 * (SIDE / camera.sensor.z) ** 2 * values[::-1, ::-1]
-    return np.asarray(decode_heterodyne(irradiance, camera, calibration=_calibration(camera)).values, np.float64)
+    return decode_heterodyne(irradiance, camera, calibration=_calibration(camera))
 
 
 @lru_cache(maxsize=4)
@@ -220,19 +219,21 @@ def _zero(camera: Camera) -> Array:
     """The views of `PEDESTAL` alone: decoders are linear."""
     views_in = _decoder_of(camera)
     assert views_in is not None
-    return views_in(np.full(camera.sensor.shape, PEDESTAL), camera)
+    return _on_pixels(views_in(np.full(camera.sensor.shape, PEDESTAL), camera))
 
 
-def _on_pixels(views: Array) -> Array:
-    """Views around the axis with the pixels of the rules, by cubic splines."""
-    step = round(SHAPE[0] / views.shape[2])
-    if views.shape[2:] == SHAPE:
-        return views
-    at = [(np.arange(n) - (n - 1) / 2) / step + (m - 1) / 2 for n, m in zip(SHAPE, views.shape[2:], strict=True)]
+def _on_pixels(field: LightField) -> Array:
+    """The views, with the directions of the pixels of the rules, by cubic splines."""
+    middle, frame = (CELLS - 1) / 2, field.frame
+    first = frame([middle, middle, 0, 0])[2:]
+    at = [
+        (-SLOPE * (np.arange(n) - (n - 1) / 2) - first[axis]) / frame.linear[axis + 2, axis + 2]
+        for axis, n in ((1, SHAPE[0]), (0, SHAPE[1]))
+    ]
     places = np.stack(np.meshgrid(*at, indexing="ij"))
-    flat = views.reshape(-1, *views.shape[2:])
-    wide = [ndimage.map_coordinates(each, places, order=3, mode="nearest") for each in flat]
-    return np.stack(wide).reshape(CELLS, CELLS, *SHAPE)
+    flat = np.asarray(field.values, np.float64).reshape(-1, *field.shape[2:])
+    views = [ndimage.map_coordinates(each, places, order=3, mode="nearest") for each in flat]
+    return np.stack(views).reshape(CELLS, CELLS, *SHAPE)
 
 
 def with_denoiser(decode: Decoder) -> Decoder:
@@ -253,9 +254,9 @@ def with_denoiser(decode: Decoder) -> Decoder:
     return both
 
 
-def repeated(picture: Array) -> Array:
-    """One picture as all views."""
-    return np.broadcast_to(picture, (CELLS, CELLS, *SHAPE)).copy()
+def repeated(picture: Array, *counts: int) -> Array:
+    """One picture as all views, or as all of a stack."""
+    return np.broadcast_to(picture, (*counts, *SHAPE)).copy()
 
 
 def moved_by_depth(recorded: Recorded) -> Array:
@@ -268,7 +269,7 @@ def moved_by_depth(recorded: Recorded) -> Array:
     layer = np.abs(1 / distance[..., None] - vergence).argmin(axis=-1)
     sharp = np.stack([wiener(recorded.values, each, recorded.noise).picture for each in kernels.values])
     picture = np.take_along_axis(sharp, layer[None], axis=0)[0]
-    views = repeated(picture)
+    views = repeated(picture, CELLS, CELLS)
     blurs = (vergence - 1 / FOCUS) * SIDE / SLOPE
     for number in np.argsort(vergence):  # the farthest first
         inside = (layer == number).astype(np.float64)
@@ -287,10 +288,6 @@ def refocus(views: Array) -> Array:
     field = LightField.from_views(values, CELL, SLOPE, FOCUS, disparity_range=(-reach, reach))
     found = [refocused(field, distance_of(blur)).to_numpy() for blur in REFOCUSED]
     return np.stack(found).astype(np.float64) - above
-
-
-def _pile(picture: Array) -> Array:
-    return np.broadcast_to(picture, (len(REFOCUSED), *SHAPE)).copy()
 
 
 # --- the tasks ---
@@ -370,8 +367,8 @@ LIGHT_FIELD = Task(
     {
         "its views": its_views,
         "its views, denoised": with_denoiser(its_views),
-        "one picture": lambda recorded: repeated(as_recorded(recorded)),
-        "one picture, denoised": lambda recorded: repeated(denoised(recorded)),
+        "one picture": lambda recorded: repeated(recorded.values, CELLS, CELLS),
+        "one picture, denoised": lambda recorded: repeated(denoised(recorded), CELLS, CELLS),
         "moved by depth": moved_by_depth,
     },
     (PSNR, Measure("PSNR, middle view", "dB", True, 1), Measure("PSNR, corner view", "dB", True, 1), SSIM),
@@ -393,8 +390,8 @@ REFOCUSING = Task(
         "its views, denoised": with_denoiser(_refocused_views),
         "its stack": as_recorded,
         "its stack, denoised": with_denoiser(as_recorded),
-        "one picture": lambda recorded: _pile(as_recorded(recorded)),
-        "one picture, denoised": lambda recorded: _pile(denoised(recorded)),
+        "one picture": lambda recorded: repeated(recorded.values, len(REFOCUSED)),
+        "one picture, denoised": lambda recorded: repeated(denoised(recorded), len(REFOCUSED)),
         "moved by depth": lambda recorded: refocus(moved_by_depth(recorded)),
     },
     (PSNR, Measure("PSNR, nearest", "dB", True, 1), Measure("PSNR, farthest", "dB", True, 1), SSIM),
