@@ -148,3 +148,29 @@ def test_a_camera_of_the_user_takes_part_with_its_control(tmp_path):
     assert running.loaded(tmp_path / "open.toml") == open_square(1.0)
     with pytest.raises(vcc.InputError, match="two cameras have one name"):
         run("edof", tmp_path / "z.zarr", cameras=[tmp_path / "open.toml"], **few)
+
+
+def test_tasks_with_views_and_bands_are_kept_and_shown(tmp_path, monkeypatch):
+    """Entrants of several exposures, decoders that suit some cameras only, colour, recordings of several sizes."""
+    monkeypatch.setattr(scenes, "VIEWS", 5)
+    scenes.scene.cache_clear()
+    path, few = tmp_path / "z.zarr", {"scenes": ("drawn",), "seeds": 1}
+    for task, left in (
+        ("light-field", ("plenoptic", "camera array, fine pixels", "open")),
+        ("refocusing", ("camera array, fine pixels", "focal stack")),
+        ("spectrum", ("Bayer mosaic", "mosaic of 16 bands", "grey")),
+    ):
+        chosen = vcc.zoo.TASKS[task]
+        denoised = [name for name in chosen.decoders if "denoised" in name or name == "total variation"]
+        others = [each.name for each in chosen.entrants([]) if each.name not in left]
+        run(task, path, without=[*denoised, *others], **few)
+        report = Report.of(path, task)
+        assert sorted(report.names("camera")) == sorted(left)
+        level = 1
+        for camera, *cells in report.rows(level)[1:]:
+            suited = [bool(len(report.by_scene(camera, name, level))) for name in report.names("decoder")]
+            assert [bool(cell) for cell in cells[1 : 1 + len(suited)]] == suited
+        done = command("zoo", "page", str(path), "--task", task, "-o", str(tmp_path / task))
+        assert done.exit_code == 0, done.stderr
+    assert report.found[0].picture.shape == (96, 103, 3)
+    scenes.scene.cache_clear()
