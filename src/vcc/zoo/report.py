@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -195,14 +196,14 @@ class Report(Brief):
 
         measure, names = self.task.measures[0], self.names("camera")
         times = [each for each in names if each.endswith("% of the time")]
-        stops = [each for each in names if each.startswith("round ") or each == "open"]
+        stops = [each for each in names if re.fullmatch(r"open|round \S+ %", each)]
         groups = [("stops", stops, figures.QUIET, "o-"), ("shorter exposures", times, "#0072B2", "v")]
         cameras = [each for each in names if each not in {*stops, *times}]
         groups += [(each, [each], f"C{n % 10}", MARKERS[n % len(MARKERS)]) for n, each in enumerate(cameras)]
         figure = figures.new_figure(4.0 * len(LEVELS), 4.6)
         panels = figure.subplots(1, len(LEVELS))
         for level, (axes, (name, electrons)) in enumerate(zip(panels, LEVELS.items(), strict=True)):
-            for label, group, colour, style in groups:
+            for label, group, colour, style in (each for each in groups if each[1]):
                 by_light = sorted(group, key=self.light)
                 scores = [Score.of(self.by_scene(each, self.best(each, level), level)) for each in by_light]
                 axes.errorbar(
@@ -219,7 +220,7 @@ class Report(Brief):
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(PercentFormatter(1))
             axes.set_title(f"{name}: {electrons:g} electrons", fontsize=figures.LABEL)
-            axes.set_xlabel("light, of the open square", fontsize=figures.LABEL)
+            axes.set_xlabel("light, of the open camera", fontsize=figures.LABEL)
             axes.set_ylabel(measure.heading if level == 0 else "", fontsize=figures.LABEL)
             if not measure.larger:
                 axes.invert_yaxis()

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from vcc.base import checks
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.measures import psnr
 from vcc.base.units import nm
@@ -147,8 +148,8 @@ def refuse(_: Camera, name: str) -> None:
 # --- decoders ---
 
 
-@dataclass(frozen=True, eq=False)
-class Filtered(Model):
+@dataclass(frozen=True, eq=False, repr=False)
+class Filtered(Brief, Model):
     """A sensor behind filters, as a matrix: its code has bands, (bands, rows, columns), and nothing is moved."""
 
     def __call__(self, cube: NDArray[np.floating]) -> Floats:
