@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 ROWS, COLUMNS = SHAPE[0], SHAPE[1] - SHEAR
 IMAGER = Imager((ROWS, COLUMNS), refine=4)
 LEARNED = ("leaves-101", "leaves-102")
-"""Scenes whose spectra the linear decoder knows; they are in no run."""
+"""Scenes whose spectra are the prior of the linear decoder; they are in no run."""
 TV_FACTOR, DENOISE_FACTOR = 0.5, 2.0
 """Factors of the noise, chosen on `LEARNED` out of 0.25, 0.5, 1, 2 and 4, the first one for CASSI."""
 STEPS = 300
