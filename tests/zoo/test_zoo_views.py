@@ -16,9 +16,19 @@ from vcc.units import um
 from vcc.zoo import Scene, run, scenes
 from vcc.zoo.bench import BLUR, SHAPE, SIDE, SLOPE, Kernels, white_field
 from vcc.zoo.decoders import Recorded
-from vcc.zoo.entrants import open_square
+from vcc.zoo.entrants import Exposure, open_square
 from vcc.zoo.pictures import Pictures
-from vcc.zoo.views import CELLS, LIGHT_FIELD, REFOCUSED, REFOCUSING, heterodyne, moved_by_depth, recorders, refocus
+from vcc.zoo.views import (
+    CELLS,
+    LIGHT_FIELD,
+    REFOCUSED,
+    REFOCUSING,
+    heterodyne,
+    moved_by_depth,
+    plenoptic,
+    recorders,
+    refocus,
+)
 
 PERIOD = 24.0
 """Of the waves, pixels."""
@@ -165,6 +175,10 @@ def test_own_cameras_and_scenes_that_do_not_fit_are_refused(tmp_path):
     with pytest.raises(vcc.InputError, match=r"sensor of large.toml is 3.84 × 2.88 mm"):
         run("light-field", tmp_path / "z.zarr", cameras=[tmp_path / "large.toml"], scenes=("drawn",))
     assert not (tmp_path / "z.zarr").exists()
+    small = plenoptic(1)
+    small = vcc.Camera(small.elements, replace(small.sensor, shape=(200, 640)))
+    with pytest.raises(vcc.InputError, match="40×128 pixels, which do not cover"):
+        LIGHT_FIELD.decoders["its views"](Recorded(np.ones((200, 640)), 0.0, None, small, (Exposure(small),)))
     nine = replace(plane(0.0), field=plane(0.0).field[:9, :9])
     with pytest.raises(vcc.InputError, match="9×9 views, which do not divide"):
         LIGHT_FIELD.truth(nine)

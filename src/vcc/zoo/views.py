@@ -223,13 +223,24 @@ def _zero(camera: Camera) -> Array:
 
 
 def _on_pixels(field: LightField) -> Array:
-    """The views, with the directions of the pixels of the rules, by cubic splines."""
+    """The views, with the directions of the pixels of the rules, by cubic splines.
+
+    Raises:
+        InputError: views that do not cover the scored part of the picture.
+    """
     middle, frame = (CELLS - 1) / 2, field.frame
     first = frame([middle, middle, 0, 0])[2:]
     at = [
         (-SLOPE * (np.arange(n) - (n - 1) / 2) - first[axis]) / frame.linear[axis + 2, axis + 2]
         for axis, n in ((1, SHAPE[0]), (0, SHAPE[1]))
     ]
+    for index, count in zip(at, field.shape[2:], strict=True):
+        ends = sorted((index[BORDER], index[-1 - BORDER]))
+        if ends[0] < -0.5 or ends[1] > count - 0.5:
+            raise InputError(
+                f"the views of the camera have {field.shape[2]}×{field.shape[3]} pixels, which do not cover the "
+                f"scored part of the picture: focus on {FOCUS:g} m, with a sensor of the zoo's area"
+            )
     places = np.stack(np.meshgrid(*at, indexing="ij"))
     flat = np.asarray(field.values, np.float64).reshape(-1, *field.shape[2:])
     views = [ndimage.map_coordinates(each, places, order=3, mode="nearest") for each in flat]
