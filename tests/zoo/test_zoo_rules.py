@@ -17,10 +17,10 @@ from vcc.patterns import Circle
 from vcc.store import save_store
 from vcc.units import mm
 from vcc.zoo import bench, scene
-from vcc.zoo.bench import BLUR, SHAPE, SIDE, SLOPE, Kernels, distance_of, exposed
-from vcc.zoo.decoders import Recorded, by_wiener
+from vcc.zoo.bench import BEYOND, BLUR, SHAPE, SIDE, SLOPE, Kernels, distance_of, exposed
+from vcc.zoo.decoders import Recorded, by_defocus, by_wiener
 from vcc.zoo.entrants import Entrant, coded, codes, loaded, open_square, plates, round_stop, with_controls
-from vcc.zoo.tasks import DEPTH, EDOF, _depth_scores, by_defocus
+from vcc.zoo.tasks import DEPTH, EDOF, _depth_scores
 
 FLAT = vcc.LightField.from_views(
     np.ones((5, 5, SHAPE[0] + 60, SHAPE[1] + 60), np.float32), SIDE / 5, SLOPE, 1.0, disparity_range=(-1.0, 1.0)
@@ -28,7 +28,7 @@ FLAT = vcc.LightField.from_views(
 """White everywhere."""
 
 
-@pytest.mark.parametrize("focus", [1.0, DEPTH.focus])
+@pytest.mark.parametrize("focus", [1.0, BEYOND])
 @pytest.mark.parametrize(("stop", "light"), [(None, 1.0), (0.25, 0.25), (LEVIN, 43 / 169)])
 def test_white_frees_the_stated_electrons_times_the_light_that_passes(stop, light, focus):
     """EMVA 1288 by hand: N·light photo-electrons; their variance is their mean, plus read noise and rounding."""
@@ -133,13 +133,13 @@ def test_controls_have_the_light_of_their_cameras():
     lights = {each.name: Kernels.of(each.camera, np.zeros(1)).light for each in entrants}
     found = {each.name: each for each in with_controls(entrants, lights, 1.0, (0.04,))}
     for each in entrants:
-        control = found[found[each.name].control]
+        control = found[found[each.name].controls[0]]
         if control.name != "open":
             stop = control.camera.elements[0].pattern
             assert isinstance(stop, Circle)
             # 69/169 and 20/49 are one control, rounded to 4 digits
             assert math.pi / 4 * stop.diameter**2 / SIDE**2 == pytest.approx(lights[each.name], abs=3e-4)
-    assert found["cubic plate"].control == "open"
+    assert found["cubic plate"].controls == ("open", "")
     with pytest.raises(vcc.InputError, match="79 %"):
         round_stop(0.9, 1.0)
 
@@ -182,7 +182,7 @@ def test_depth_finds_the_kernel_that_blurred_a_flat_object():
 def test_cameras_of_other_pixels_are_refused(tmp_path):
     path = tmp_path / "mine.toml"
     open_square(1.0).save(path)
-    assert Entrant("mine", loaded(path)).camera == open_square(1.0)
+    assert Entrant.single("mine", loaded(path)).camera == open_square(1.0)
     vcc.Camera(open_square(1.0).elements, vcc.Sensor(bench.image_distance(1.0), SHAPE, 0.03 * mm)).save(path)
     with pytest.raises(vcc.InputError, match=r"mine.toml sees .* pitch=20 um"):
         loaded(path)

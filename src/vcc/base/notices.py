@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from vcc.base.errors import ResultWarning, warn_of_result
 
 MANY_KINDS = 5
 """Largest number of kinds of warnings that are passed on."""
+_collecting: list[tuple[int, Notices]] = []
+"""Who collects now: threads, and their notices."""
 
 
 class Notices:
@@ -35,17 +39,39 @@ class Notices:
         self._kinds += other._kinds
         self._first = {**other._first, **self._first}
 
+    @property
+    def texts(self) -> list[str]:
+        """The first warning of each kind, sorted."""
+        return sorted(self._first.values())
+
     @contextmanager
     def gathered(self) -> Iterator[None]:
-        """Collect the warnings issued within the context."""
-        with warnings.catch_warnings(record=True) as caught:
+        """Collect the warnings about results that are issued within the context.
+
+        Warnings of a thread belong to the innermost context of that thread; those of threads without a context
+        belong to the first context that was opened. Filters of warnings are those of the whole process: contexts
+        of several threads need a context around all of them.
+        """
+        mine = (threading.get_ident(), self)
+        with warnings.catch_warnings():
+            shown = warnings.showwarning
+
+            def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
+                if not issubclass(category, ResultWarning):
+                    shown(message, category, *place, **more)
+                elif _collecting:
+                    own = [found for thread, found in _collecting if thread == threading.get_ident()]
+                    (own[-1] if own else _collecting[0][1])._heard(str(message))
+
             warnings.simplefilter("always", ResultWarning)
-            yield
-        for each in caught:
-            said = str(each.message)
-            if not issubclass(each.category, ResultWarning):
-                warnings.warn_explicit(each.message, each.category, each.filename, each.lineno)
-                continue
-            kind = "".join(letter for letter in said if not letter.isdigit() and letter not in ".e-")
-            self._kinds[kind] += 1
-            self._first.setdefault(kind, said)
+            warnings.showwarning = hear  # restored by catch_warnings
+            _collecting.append(mine)
+            try:
+                yield
+            finally:
+                _collecting.remove(mine)
+
+    def _heard(self, said: str) -> None:
+        kind = "".join(letter for letter in said if not letter.isdigit() and letter not in ".e-")
+        self._kinds[kind] += 1
+        self._first.setdefault(kind, said)

@@ -173,6 +173,7 @@ ZOO = {
         "adds only its own results.",
         "vcc zoo run --task edof -o zoo.zarr",
         "vcc zoo run --task edof -o zoo.zarr --camera my.toml --decoder my.py:decode",
+        "vcc zoo run --task light-field -o zoo.zarr --seeds 3",
         "vcc zoo run --task depth -o zoo.zarr --scene leaves-7 --scene views.zarr --executor processes",
     ),
     "table": (

@@ -12,6 +12,7 @@ from vcc.zoo.decoders import Decoder, Recorded
 from vcc.zoo.report import Report
 from vcc.zoo.running import run
 from vcc.zoo.scenes import Scene, scene
-from vcc.zoo.tasks import TASKS, Task
+from vcc.zoo.task import Task
+from vcc.zoo.tasks import TASKS
 
 __all__ = ["TASKS", "Decoder", "Recorded", "Report", "Scene", "Task", "run", "scene"]

@@ -9,7 +9,8 @@ in a pixel: a camera that passes half of the light gets half of the electrons.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm, um
 from vcc.camera import Camera
 from vcc.image import Image
+from vcc.light_field import LightField
 from vcc.optics.electronics import LIGHT_SPEED, PLANCK, Electronics
 from vcc.optics.lens import Lens
 from vcc.optics.sensor import Sensor
@@ -63,6 +65,10 @@ SLOPE = PITCH / image_distance(FOCUS)
 """Angular size of a pixel, as a slope."""
 REACH = BLUR * SLOPE / SIDE
 """|1/Z − 1/FOCUS| of the nearest and of the farthest objects, 1/m."""
+REFERENCE = (SIDE * SLOPE) ** 2
+"""Irradiance of white (radiance 1) through the square, times the area of a pixel, m²·sr; the same at all distances
+of the sensor, because equal pixels see equal angles."""
+WHITE_VIEWS, WHITE_PIXELS = 5, (16, 16)
 
 
 def distance_of(blur: Any) -> Any:
@@ -72,6 +78,14 @@ def distance_of(blur: Any) -> Any:
         blur: a number or an array.
     """
     return 1 / (1 / FOCUS + blur * SLOPE / SIDE)
+
+
+LEAST_BLUR = 3.0
+"""Blur of the farthest objects of cameras that are focused beyond all of them, pixels."""
+BEYOND = distance_of(-BLUR - LEAST_BLUR)
+"""That focus, metres."""
+ALL_BLURS = tuple(float(blur) for blur in np.arange(BLUR + 1, -BLUR - 0.01, -1.0))
+"""Of the points of the calibration, one for each pixel of blur."""
 
 
 def of_lens(*elements: object, focus: float = FOCUS) -> Camera:
@@ -96,6 +110,28 @@ def check_camera(camera: Camera, name: str) -> None:
             f"{FOCAL_LENGTH / mm:g} mm take Sensor(z={image_distance(FOCUS) / mm:.6g} mm, shape={SHAPE}, "
             f"pitch={PITCH / um:g} um)"
         )
+
+
+def check_area(camera: Camera, name: str) -> None:
+    """Check that the sensor of a camera is not larger than the zoo's; its pixels may be finer.
+
+    Raises:
+        InputError: it is more than 5 % larger.
+    """
+    most = tuple(n * PITCH * 1.05 for n in SHAPE)
+    found = tuple(n * pitch for n, pitch in zip(camera.sensor.shape, camera.sensor.pitches, strict=True))
+    if found[0] > most[0] or found[1] > most[1]:
+        raise InputError(
+            f"the sensor of {name} is {found[1] / mm:.3g} × {found[0] / mm:.3g} mm, and the zoo's "
+            f"{SHAPE[1] * PITCH / mm:g} × {SHAPE[0] * PITCH / mm:g} mm: take fewer or finer pixels"
+        )
+
+
+def white_field() -> LightField:
+    """Radiance 1 through the square, beyond the field of view."""
+    values = np.ones((WHITE_VIEWS, WHITE_VIEWS, *WHITE_PIXELS), np.float32)
+    slope = 2 * max(SHAPE) * SLOPE / min(WHITE_PIXELS)
+    return LightField.from_views(values, SIDE / WHITE_VIEWS, slope, FOCUS, disparity_range=(0.0, 0.0))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,32 +176,42 @@ class Kernels(Brief):
         return np.asarray(self.values.mean(axis=0))
 
 
-def exposure_time(electrons: float) -> float:
-    """Seconds after which white light (radiance 1) through the square frees so many electrons in a pixel.
+@lru_cache(maxsize=64)
+def calibrated(camera: Camera, blurs: tuple[float, ...]) -> Kernels:
+    """The kernels of a camera."""
+    return Kernels.of(camera, np.array(blurs))
 
-    N = η · E · A · t · λ/(h·c) (EMVA 1288), with E = SIDE²/z².
+
+def exposure_time(electrons: float, reference: float = REFERENCE) -> float:
+    """Seconds after which white light (radiance 1) through the open camera frees so many electrons in a pixel.
+
+    N = η · E · A · t · λ/(h·c) (EMVA 1288).
+
+    Args:
+        electrons: in a pixel of the open camera.
+        reference: E·A of white in the open camera.
     """
-    irradiance = (SIDE / image_distance(FOCUS)) ** 2
     efficiency, wavelength = ELECTRONICS.quantum_efficiency, ELECTRONICS.wavelength
     assert isinstance(efficiency, float)
     assert isinstance(wavelength, float)
-    return electrons / (efficiency * irradiance * PITCH**2 * wavelength / (PLANCK * LIGHT_SPEED))
+    return electrons / (efficiency * reference * wavelength / (PLANCK * LIGHT_SPEED))
 
 
-def exposed(camera: Camera, image: Image, electrons: float, light: float, seed: int) -> tuple[Array, float]:
+def exposed(
+    camera: Camera, image: Image, electrons: float, light: float, seed: int, reference: float = REFERENCE
+) -> tuple[Array, float]:
     """A recording upright, white 1, and the standard deviation of its noise, from the recording itself.
 
-    Equal pixels see equal angles, so that white light frees equal charges wherever the sensor is focused:
-    E · A = (SIDE · pitch/z)² = (SIDE · SLOPE)².
-
     Args:
-        camera: that made the image.
+        camera: that made the image; its electronics are replaced by the zoo's.
         image: irradiance.
-        electrons: of white light through the whole square.
-        light: share of that light that the camera passes.
+        electrons: of white light in a pixel of the open camera.
+        light: electrons of white light in this camera's pixels, the mean, relative to those.
         seed: of the noise.
+        reference: see `exposure_time`.
     """
-    made = expose_image(image, camera.sensor, exposure_time(electrons), seed=seed, threads=1)
+    sensor = replace(camera.sensor, electronics=ELECTRONICS, response=None)
+    made = expose_image(image, sensor, exposure_time(electrons, reference), seed=seed, threads=1)
     charge = np.asarray(made.electrons(), np.float64)
     white = electrons * light
     noise = math.sqrt(max(float(charge.mean()), 0.0) + ELECTRONICS.read_noise**2 + 1 / 12) / white

@@ -6,10 +6,14 @@ import hashlib
 import importlib.util
 import math
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
@@ -27,8 +31,26 @@ from vcc.shapes.surfaces import Cubic
 from vcc.zoo.bench import REACH, SIDE, check_camera, of_lens
 
 WAVELENGTH = 550 * nm
+OWN = "the user's"
+"""Of `Entrant.decoders`: those of the user alone, which suit all cameras."""
 MOST_ROUND = math.pi / 4 + 1e-3
 """Light of the largest circle in the square, and the error of traced rays."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Exposure(Brief):
+    """One of the pictures that an entrant takes.
+
+    Args:
+        camera: its optics and sensor.
+        time: exposure time relative to that of the rules.
+        filters: of the pixels, transmission 0 to 1 by band: (rows, columns, bands), or that broadcasts to it, as
+            the sensor shows the scene. None for none.
+    """
+
+    camera: Camera
+    time: float = 1.0
+    filters: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,17 +59,32 @@ class Entrant(Brief):
 
     Args:
         name: of the camera.
-        camera: focused as the task demands.
-        time: exposure time relative to all others: less than 1 for the control of a shorter exposure.
-        control: the control of the same light; empty for controls. `with_controls` names it.
+        exposures: the pictures that it takes, one after the other or at once.
+        controls: names of the entrants that it is compared with, in the order of `vcc.zoo.Task.against`; empty
+            strings for none, and nothing at all for controls.
         source: publication.
+        decoders: names of the task's decoders that suit it; empty for all.
+        traced: whether it is calibrated by images of points (`vcc.zoo.bench.Kernels`).
+        options: of `vcc.Camera.capture`; empty lets the camera choose, with many rays if it chooses rays.
     """
 
     name: str
-    camera: Camera
-    time: float = 1.0
-    control: str = ""
+    exposures: tuple[Exposure, ...]
+    controls: tuple[str, ...] = ()
     source: str = ""
+    decoders: tuple[str, ...] = ()
+    traced: bool = True
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def single(cls, name: str, camera: Camera, time: float = 1.0, **more: Any) -> Entrant:
+        """Of one exposure."""
+        return cls(name, (Exposure(camera, time),), **more)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the first exposure."""
+        return self.exposures[0].camera
 
 
 def open_square(focus: float) -> Camera:
@@ -64,7 +101,7 @@ def round_stop(light: float, focus: float) -> Entrant:
     if light > MOST_ROUND:
         raise InputError(f"no round stop in the square passes {light:.0%} of its light: π/4 = 79 % is the most")
     stop = Mask(Circle(SIDE * math.sqrt(min(light * 4 / math.pi, 1))))
-    return Entrant(round_name(light), of_lens(stop, focus=focus))
+    return Entrant.single(round_name(light), of_lens(stop, focus=focus))
 
 
 def round_name(light: float) -> str:
@@ -74,7 +111,7 @@ def round_name(light: float) -> str:
 
 def coded(name: str, code: Any, source: str, focus: float) -> Entrant:
     """A code of opaque cells that fills the square."""
-    return Entrant(name, of_lens(Mask(code, width=SIDE), focus=focus), source=source)
+    return Entrant.single(name, of_lens(Mask(code, width=SIDE), focus=focus), source=source)
 
 
 def codes(focus: float) -> list[Entrant]:
@@ -95,10 +132,16 @@ def plates(focus: float) -> list[Entrant]:
         PhasePlate(RandomRings(SIDE / 2, MARGIN * REACH * SIDE / 2, power), diameter=SIDE) for power in (1, 0)
     )
     return [
-        Entrant("cubic plate", of_lens(cubic, focus=focus), source="Dowski and Cathey 1995"),
-        Entrant("random-phase plate", of_lens(rim, random, focus=focus), source="García-Guerrero et al. 2007"),
-        Entrant("radial plate", of_lens(rim, radial, focus=focus), source="Cossairt et al. 2010"),
+        Entrant.single("cubic plate", of_lens(cubic, focus=focus), source="Dowski and Cathey 1995"),
+        Entrant.single(
+            "random-phase plate", of_lens(rim, random, focus=focus), source="García-Guerrero et al. 2007"
+        ),
+        Entrant.single("radial plate", of_lens(rim, radial, focus=focus), source="Cossairt et al. 2010"),
     ]
+
+
+AGAINST = ("a round stop of its light", "a shorter exposure of the open square")
+"""What `with_controls` compares with."""
 
 
 def with_controls(
@@ -115,30 +158,42 @@ def with_controls(
         curve: light of further round stops.
     """
     wide = open_square(focus)
-    controls = {"open": Entrant("open", wide)}
-    shares = {round(lights[each.name], 4) for each in entrants}
-    for light in sorted(shares | set(curve), reverse=True):
+    controls = {"open": Entrant.single("open", wide)}
+    shares = {each.name: round(lights[each.name], 4) for each in entrants}
+    for light in sorted({*shares.values(), *curve}, reverse=True):
         if light <= MOST_ROUND:
             stop = round_stop(light, focus)
             controls[stop.name] = stop
-        if light in shares and light < 0.999:
-            short = Entrant(f"open, {100 * light:.3g} % of the time", wide, time=light)
-            controls[short.name] = short
-    named = [
-        replace(each, control="open" if light > MOST_ROUND else round_name(round(light, 4)))
-        for each, light in ((each, lights[each.name]) for each in entrants)
+        if light in shares.values() and light < 0.999:
+            controls[_short(light)] = Entrant.single(_short(light), wide, light)
+    return [
+        *(
+            replace(
+                each,
+                controls=("open" if light > MOST_ROUND else round_name(light), _short(light) * (light < 0.999)),
+            )
+            for each, light in ((each, shares[each.name]) for each in entrants)
+        ),
+        *controls.values(),
     ]
-    return [*named, *controls.values()]
 
 
-def loaded(path: Path) -> Camera:
+def _short(light: float) -> str:
+    return f"open, {100 * light:.3g} % of the time"
+
+
+def loaded(path: Path, check: Callable[[Camera, str], None] = check_camera) -> Camera:
     """A camera file of the user, checked.
 
+    Args:
+        path: of the file.
+        check: raises InputError for a camera, with its name, that the task does not support.
+
     Raises:
-        InputError: it cannot be read, or its pixels differ from those of the rules.
+        InputError: it cannot be read, or it does not follow the rules.
     """
     camera = load_camera(path)
-    check_camera(camera, path.name)
+    check(camera, path.name)
     return camera
 
 

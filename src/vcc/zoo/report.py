@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from os import PathLike
@@ -19,7 +20,8 @@ from vcc.showcase.words import write_page
 from vcc.sweeps.table import Table
 from vcc.zoo.bench import LEVELS
 from vcc.zoo.running import SHOWN_LEVEL, Scored, results
-from vcc.zoo.tasks import Task, task_named
+from vcc.zoo.task import Task
+from vcc.zoo.tasks import task_named
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,16 +104,12 @@ class Report(Brief):
     def best(self, camera: str, level: int) -> str:
         """The decoder with the best mean of the first measure."""
         sign = 1 if self.task.measures[0].larger else -1
-        return max(self.names("decoder"), key=lambda name: sign * self.by_scene(camera, name, level).mean())
+        suited = [name for name in self.names("decoder") if len(self.by_scene(camera, name, level))]
+        return max(suited, key=lambda name: sign * self.by_scene(camera, name, level).mean())
 
-    def shorter(self, camera: str) -> str | None:
-        """The control of a shorter exposure with the light of a camera."""
-        if not self.first(camera).about["control"]:
-            return None
-        light = self.light(camera)
-        of_time = [name for name in self.names("camera") if name.endswith("% of the time")]
-        near = [name for name in of_time if abs(self.light(name) - light) < 2e-3]
-        return near[0] if near else None
+    def controls(self, camera: str) -> tuple[str, ...]:
+        """The names of the controls of a camera; none for controls."""
+        return tuple(self.first(camera).about["controls"])
 
     def gain(self, camera: str, other: str | None, level: int) -> Score | None:
         """By how much a camera beats another one, each by its best decoder: the mean of differences of scenes."""
@@ -124,15 +122,16 @@ class Report(Brief):
     def rows(self, level: int) -> list[list[str]]:
         """The table of a light level, its first row with headings."""
         measure, decoders = self.task.measures[0], self.names("decoder")
-        rows = [["camera", "light", *decoders, "against its round stop", "against a shorter exposure"]]
+        against = self.task.against
+        rows = [["camera", "light", *decoders, *(f"against {each}" for each in against)]]
         for camera in self.names("camera"):
             best = self.best(camera, level)
             cells = []
             for name in decoders:
-                cell = Score.of(self.by_scene(camera, name, level)).text(measure.digits)
+                values = self.by_scene(camera, name, level)
+                cell = Score.of(values).text(measure.digits) if len(values) else ""
                 cells.append(f"**{cell}**" if name == best else cell)
-            others = (str(self.first(camera).about["control"]), self.shorter(camera))
-            gains = [self.gain(camera, other, level) for other in others]
+            gains = [self.gain(camera, other, level) for other in self.controls(camera) or [""] * len(against)]
             told = ["" if gain is None else gain.text(measure.digits, "+") for gain in gains]
             rows.append([camera, f"{self.light(camera):.1%}", *cells, *told])
         return rows
@@ -155,9 +154,9 @@ class Report(Brief):
         return (
             f"{measure.heading}, {'more' if measure.larger else 'less'} is better: mean over "
             f"{len(scenes)} scenes ({', '.join(Path(name).name for name in scenes)}) and {seeds} recordings of "
-            "each, ± the standard error over scenes. Light is relative to the open square at the same exposure "
-            "time. The last two columns are differences, positive if the camera is better, of the best decoders "
-            "(bold): to a round stop, and to a shorter exposure of the open square, with the same light."
+            "each, ± the standard error over scenes. Light is relative to the open camera at the same exposure "
+            "time. The last columns are differences, positive if the camera is better, of the best decoders "
+            f"(bold): to {' and to '.join(self.task.against)}."
         )
 
     @property
@@ -179,8 +178,9 @@ class Report(Brief):
             for level in range(each.scores.shape[0])
             for seed in range(each.scores.shape[1])
         ]
-        words = ("camera", "decoder", "scene", "control")
+        words = ("camera", "decoder", "scene")
         columns = {name: np.array([str(each.about[name]) for each, _, _ in rows]) for name in words}
+        columns["control"] = np.array([(*each.about["controls"], "")[0] for each, _, _ in rows])
         columns["light"] = np.array([float(each.about["light"]) for each, _, _ in rows])
         columns["electrons"] = np.array([list(LEVELS.values())[level] for _, level, _ in rows])
         columns["seed"] = np.array([seed for _, _, seed in rows])
@@ -196,14 +196,14 @@ class Report(Brief):
 
         measure, names = self.task.measures[0], self.names("camera")
         times = [each for each in names if each.endswith("% of the time")]
-        stops = [each for each in names if each.startswith("round ") or each == "open"]
+        stops = [each for each in names if re.fullmatch(r"open|round \S+ %", each)]
         groups = [("stops", stops, figures.QUIET, "o-"), ("shorter exposures", times, "#0072B2", "v")]
         cameras = [each for each in names if each not in {*stops, *times}]
         groups += [(each, [each], f"C{n % 10}", MARKERS[n % len(MARKERS)]) for n, each in enumerate(cameras)]
         figure = figures.new_figure(4.0 * len(LEVELS), 4.6)
         panels = figure.subplots(1, len(LEVELS))
         for level, (axes, (name, electrons)) in enumerate(zip(panels, LEVELS.items(), strict=True)):
-            for label, group, colour, style in groups:
+            for label, group, colour, style in (each for each in groups if each[1]):
                 by_light = sorted(group, key=self.light)
                 scores = [Score.of(self.by_scene(each, self.best(each, level), level)) for each in by_light]
                 axes.errorbar(
@@ -220,7 +220,7 @@ class Report(Brief):
             axes.set_xscale("log")
             axes.xaxis.set_major_formatter(PercentFormatter(1))
             axes.set_title(f"{name}: {electrons:g} electrons", fontsize=figures.LABEL)
-            axes.set_xlabel("light, of the open square", fontsize=figures.LABEL)
+            axes.set_xlabel("light, of the open camera", fontsize=figures.LABEL)
             axes.set_ylabel(measure.heading if level == 0 else "", fontsize=figures.LABEL)
             if not measure.larger:
                 axes.invert_yaxis()
@@ -230,7 +230,7 @@ class Report(Brief):
 
     def strip(self) -> Figure:
         """The first scene, as recorded and as decoded by the best decoder, for cameras and some controls."""
-        shown = [name for name in self.names("camera") if self.first(name).about["control"]]
+        shown = [name for name in self.names("camera") if self.controls(name)]
         shown = [*shown[: STRIP - 2], *[name for name in ("open", "round 4 %") if name in self.names("camera")]]
         scene = self.names("scene")[0]
         columns = []

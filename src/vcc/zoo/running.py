@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import os
-import threading
 import time
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -19,28 +14,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError
+from vcc.base.notices import Notices
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import check_path, expanded, read_bytes, read_json, reading, value_at
 from vcc.base.values import fingerprint
 from vcc.base.version import VERSION
-from vcc.camera import Camera
 from vcc.files.atomic import refusal
 from vcc.files.parts import check_name, clear_folder, part_of
 from vcc.files.writer_lock import WriterLock
 from vcc.run.executors import Work, worker_pool
-from vcc.zoo.bench import ELECTRONICS, LEVELS, SIDE, SLOPE, Kernels, exposed
+from vcc.zoo.bench import ELECTRONICS, LEVELS
 from vcc.zoo.decoders import Decoder, Recorded
-from vcc.zoo.entrants import Entrant, FromFile, loaded, with_controls
+from vcc.zoo.entrants import OWN, Entrant, FromFile, loaded
+from vcc.zoo.pictures import Pictures
 from vcc.zoo.scenes import BUILT_IN, identity, scene
-from vcc.zoo.tasks import TASKS, Task, task_named
+from vcc.zoo.task import Task
+from vcc.zoo.tasks import TASKS, task_named
 
 Array = NDArray[np.float64]
 
 KEY = "zoo"
-FORMAT_VERSION = 1
-RAYS_PER_PIXEL = 1024
-"""For cameras with plates; others use footprints, without noise of sampling."""
+FORMAT_VERSION = 2
 SHOWN_LEVEL = 1
 """The light level of pictures in strips: dim."""
 
@@ -74,8 +69,8 @@ class Scored(Brief):
         key: fingerprint of all that it depends on.
         about: names, light, control and so on, as JSON.
         scores: (levels, seeds, measures).
-        picture: what the decoder made of the first seed at `SHOWN_LEVEL`, grey, uint8 of sRGB.
-        recording: the recording that it was made of, likewise.
+        picture: what the decoder made of the first seed at `SHOWN_LEVEL`, one picture of it, uint8 of gamma 2.2.
+        recording: the recording that it was made of, likewise; the middle one of several exposures.
         truth: likewise.
     """
 
@@ -85,12 +80,6 @@ class Scored(Brief):
     picture: NDArray[np.uint8]
     recording: NDArray[np.uint8]
     truth: NDArray[np.uint8]
-
-
-@lru_cache(maxsize=64)
-def calibrated(camera: Camera, blurs: tuple[float, ...]) -> Kernels:
-    """The kernels of a camera."""
-    return Kernels.of(camera, np.array(blurs))
 
 
 def run(
@@ -108,7 +97,7 @@ def run(
     """Score cameras, scenes and decoders, except those whose results the store has already.
 
     Args:
-        task: "edof" or "depth".
+        task: a name of `vcc.zoo.TASKS`.
         output: folder of the store, a Zarr group; created, or continued.
         scenes: names of scenes, or paths of light fields and splats (`vcc.zoo.scenes.scene`).
         seeds: number of recordings of each scene at each light level.
@@ -144,12 +133,18 @@ def run(
         for name, content in contents.items()
         for each in entrants
     ]
+    for trial in trials:
+        if OWN in trial.entrant.decoders and not trial.keys:
+            raise InputError(
+                f"no decoder of the task {task} suits {trial.entrant.name}: give --decoder my.py:decode"
+            )
+    trials = [trial for trial in trials if trial.keys]
     with Store(output) as store:
         kept = store.keys()
         listed = [key for trial in trials for key in trial.keys]
         done, total, made = sum(key in kept for key in listed), len(listed), 0
         todo = [_lacking(trial, kept) for trial in trials if not kept.issuperset(trial.keys)]
-        with _hearing():
+        with Notices().gathered():  # around those of threads
             for results in _performed(todo, executor):
                 for result in results:
                     store.put(result)
@@ -160,11 +155,9 @@ def run(
 
 
 def _entrants(task: Task, cameras: Sequence[Path]) -> list[Entrant]:
-    middle = (task.blurs[len(task.blurs) // 2],)
-    entrants = task.entrants(task.focus)
-    entrants += [Entrant(path.stem, loaded(path), source=str(path)) for path in cameras]
-    lights = {each.name: calibrated(each.camera, middle).light for each in entrants}
-    listed = with_controls(entrants, lights, task.focus, task.curve)
+    listed = task.entrants(
+        [Entrant.single(path.stem, loaded(path, task.check), source=str(path)) for path in cameras]
+    )
     names = [each.name for each in listed]
     if len(set(names)) < len(names):
         raise InputError(f"two cameras have one name, out of {', '.join(names)}: rename the file")
@@ -183,18 +176,24 @@ def _trial(
         VERSION,
         FORMAT_VERSION,
         task.name,
-        task.focus,
         task.blurs,
         tuple(LEVELS.values()),
         ELECTRONICS,
         seeds,
     )
-    known = (*rules, entrant.name, entrant.control, entrant.camera, entrant.time, name, content)
+    exposures = tuple((each.camera, each.time, each.filters) for each in entrant.exposures)
+    options = tuple(sorted(entrant.options.items()))
+    known = (*rules, entrant.name, entrant.controls, exposures, options, name, content)
+    suited = {
+        decoder: function
+        for decoder, function in functions.items()
+        if function is not None or not entrant.decoders or decoder in entrant.decoders
+    }
     keys = tuple(
         fingerprint(*known, decoder, () if function is None else (function.function, function.digest))
-        for decoder, function in functions.items()
+        for decoder, function in suited.items()
     )
-    return Trial(task.name, entrant, name, functions, keys, seeds)
+    return Trial(task.name, entrant, name, suited, keys, seeds)
 
 
 def _lacking(trial: Trial, kept: set[str]) -> Trial:
@@ -210,35 +209,13 @@ def _performed(trials: Sequence[Trial], executor: Any) -> Iterator[list[Scored]]
         for trial in trials:
             yield _scored(trial)
     elif trials:
-        for _, results in worker_pool(executor).each(Work(scored, os.getpid()), trials):
+        for _, results in worker_pool(executor).each(Work(scored, None), trials):
             yield results
 
 
-_heard = threading.local()
-"""The warnings about results in this thread: its `words`."""
-
-
-@contextmanager
-def _hearing() -> Iterator[None]:
-    """Collect warnings about results by thread: filters of warnings are those of the whole process."""
-    with warnings.catch_warnings():
-        shown = warnings.showwarning
-
-        def hear(message: Any, category: type[Warning], *place: Any, **more: Any) -> None:
-            if issubclass(category, ResultWarning):
-                _heard.__dict__.setdefault("words", []).append(str(message))
-            else:
-                shown(message, category, *place, **more)
-
-        warnings.simplefilter("always", ResultWarning)
-        warnings.showwarning = hear  # restored by catch_warnings
-        yield
-
-
-def scored(asking: int, trial: Trial) -> list[Scored]:
-    """The results of a trial, as a task; ``asking`` is the process that hears the warnings of its threads."""
-    with nullcontext() if os.getpid() == asking else _hearing():
-        return _scored(trial)
+def scored(_: None, trial: Trial) -> list[Scored]:
+    """The results of a trial, as a task."""
+    return _scored(trial)
 
 
 def _scored(trial: Trial) -> list[Scored]:
@@ -248,21 +225,11 @@ def _scored(trial: Trial) -> list[Scored]:
         InputError: a decoder that fails, or returns something else than its task takes.
     """
     task, made, entrant = TASKS[trial.task], scene(trial.scene), trial.entrant
-    kernels, truth = calibrated(entrant.camera, task.blurs), task.truth(made)
-    _heard.words = []
-    image = entrant.camera.capture(made.field, threads=1)
-    if image.sampling_error:  # by rays
-        image = entrant.camera.capture(made.field, samples=RAYS_PER_PIXEL, threads=1)
-    told, _heard.words = sorted(set(_heard.words)), []  # warnings of decoders, of single recordings, are dropped
-    light = kernels.light * entrant.time
-    white = kernels.light * (SIDE * SLOPE / entrant.camera.sensor.pitches[1]) ** 2  # irradiance
-    sampling = float(image.sampling_error or 0.0) / white
+    truth, notices = task.truth(made), Notices()
+    with notices.gathered():
+        taken = Pictures.of(task, entrant, made)
     recordings = [
-        [
-            exposed(entrant.camera, image, electrons * entrant.time, kernels.light, seed)
-            for seed in range(trial.seeds)
-        ]
-        for electrons in LEVELS.values()
+        [taken.recorded(electrons, seed) for seed in range(trial.seeds)] for electrons in LEVELS.values()
     ]
     found = []
     for (name, function), key in zip(trial.decoders.items(), trial.keys, strict=True):
@@ -270,12 +237,12 @@ def _scored(trial: Trial) -> list[Scored]:
         scores = np.empty((len(LEVELS), trial.seeds, len(task.all_measures)))
         shown = truth
         for level, row in enumerate(recordings):
-            for seed, (values, noise) in enumerate(row):
+            for seed, recorded in enumerate(row):
                 begun = time.perf_counter()
-                recorded = Recorded(values, math.hypot(noise, sampling), kernels, entrant.camera)
-                decoded = task.checked(_decoded(decode, name, recorded), name)
-                taken = time.perf_counter() - begun
-                scores[level, seed] = (*task.scored(decoded, truth), taken)
+                with Notices().gathered():  # warnings of decoders, of single recordings, are dropped
+                    decoded = task.checked(_decoded(decode, name, recorded), name)
+                seconds = time.perf_counter() - begun
+                scores[level, seed] = (*task.scored(decoded, truth), seconds)
                 if (level, seed) == (SHOWN_LEVEL, 0):
                     shown = decoded
         about = {
@@ -283,15 +250,16 @@ def _scored(trial: Trial) -> list[Scored]:
             "camera": entrant.name,
             "decoder": name,
             "scene": trial.scene,
-            "control": entrant.control,
-            "light": round(light, 6),
+            "controls": list(entrant.controls),
+            "light": round(taken.light, 6),
             "source": entrant.source,
-            "missing_rays": round(float(image.missing_rays), 4),
-            "sampling_error": sampling,
+            "missing_rays": round(taken.missing_rays, 4),
+            "sampling_error": max(taken.samplings),
             "note": made.note,
-            "warnings": told,
+            "warnings": notices.texts,
         }
-        pictures = (task.shown(shown), recordings[SHOWN_LEVEL][0][0], task.shown(truth))
+        first = recordings[SHOWN_LEVEL][0].values
+        pictures = (task.shown(shown), first if first.ndim == 2 else first[len(first) // 2], task.shown(truth))
         found.append(Scored(key, about, scores, *(_grey(picture) for picture in pictures)))
     return found
 

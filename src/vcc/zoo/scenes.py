@@ -64,7 +64,7 @@ class Scene(Brief):
     def sharp(self) -> Array:
         """What a pinhole in the middle of the lens sees, upright, white 1: the truth, of `SHAPE`."""
         view = self.field.view(*(n // 2 for n in self.field.shape[:2])).to_numpy()
-        return np.asarray(_middle(view, SHAPE), np.float64)
+        return np.asarray(cropped(view, SHAPE), np.float64)
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ def _of_planes(name: str, planes: PlanesScene, cameras: CameraArray) -> Scene:
         blur = np.where(share > most, VIEWS * cameras.disparity(plane.distance), blur)
         most = np.maximum(most, share)
     values = np.asarray(made.values).mean(axis=-1)
-    return Scene(name, _declared(values, 0.0), _middle(blur[::-1, ::-1], SHAPE))  # s runs to the left
+    return Scene(name, _declared(values, 0.0), cropped(blur[::-1, ::-1], SHAPE))  # s runs to the left
 
 
 def _of_splats(name: str, path: Path) -> Scene:
@@ -207,7 +207,7 @@ def _of_splats(name: str, path: Path) -> Scene:
     white = float(np.percentile(views[VIEWS // 2, VIEWS // 2], 99.5))
     disparity = cameras.spacings[1] / slope * (1 / depth.astype(np.float64) - 1 / cameras.focus_distance)
     values = np.minimum(views / white, 1)
-    return Scene(name, _declared(values, 0.0), _middle(VIEWS * disparity, SHAPE))
+    return Scene(name, _declared(values, 0.0), cropped(VIEWS * disparity, SHAPE))
 
 
 def _of_views(name: str, path: Path) -> Scene:
@@ -239,7 +239,7 @@ def _of_views(name: str, path: Path) -> Scene:
     blur = None
     if exact is not None:
         one_of_each = exact[: rows * bins : bins, : columns * bins : bins]
-        blur = _middle(nu * (one_of_each - middle) / bins, SHAPE)
+        blur = cropped(nu * (one_of_each - middle) / bins, SHAPE)
     reached = nu * (ends[1] - ends[0]) / 2 / bins
     note = f"{nu} views across, {(ends[1] - ends[0]) / 2 / bins:.2g} pixels apart at the ends; blur {reached:.3g}"
     return Scene(name, _declared(np.minimum(values / white, 1), middle / bins), blur, note)
@@ -256,6 +256,7 @@ def _declared(values: Array, disparity: float) -> LightField:
     )
 
 
-def _middle(picture: Array, shape: tuple[int, int]) -> Array:
+def cropped(picture: Array, shape: tuple[int, int]) -> Array:
+    """The middle of a picture."""
     top, left = ((n - m) // 2 for n, m in zip(picture.shape, shape, strict=True))
     return picture[top : top + shape[0], left : left + shape[1]]

@@ -28,12 +28,13 @@ def run(
     """Score cameras, scenes and decoders, except those whose results are in the store already.
 
     Args:
-        task: edof: a picture all in focus. depth: the distance of each pixel.
+        task: edof: a picture all in focus. depth: the distance of each pixel. light-field: 5×5 views. refocusing:
+            pictures focused at 5 distances. spectrum: 26 bands of each pixel.
         output: A folder, .zarr. The same command resumes an interrupted run; another one adds to it.
         scene: drawn, leaves-N (N is a seed), or the path of a light field, a store or splats. May be repeated.
             Default: drawn, leaves-1, leaves-2.
         seeds: Recordings of each scene at each light level.
-        camera: Your camera file, compared with a round stop of its light. May be repeated.
+        camera: Your camera file, compared with the controls of the task. May be repeated.
         decoder: Your function of a recording. May be repeated.
         without: A decoder or a camera to leave out. May be repeated.
         executor: What runs the trials: `processes` or `threads`, one per core of this machine, or a Dask cluster
