@@ -15,12 +15,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.ndimage import gaussian_filter
 
 import vcc
+from vcc.gallery.light_field_atoms import VIEWS, Effort, atoms, reconstructed
 from vcc.plot import style
 from vcc.recover import ideal_camera, refocused
 from vcc.showcase.scene import FAR, MIDDLE, NEAR, demo_scene
@@ -30,27 +28,10 @@ Array = NDArray[np.floating]
 
 DESK = Path(__file__).parents[1] / "docs" / "data" / "desk.zarr"
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-VIEWS, FINE = 5, 4
-"""Views each way; points of a training picture for each pixel of a view."""
 NOISE = 0.005
 """Standard deviation of the sensor's noise, as a share of white through the open lens."""
-CONTRASTS = (0.1, 1.0, 10.0, 100.0)
-"""Variances of a patch, as multiples of the mean of those that were learned from."""
-MEAN, MEAN_VARIANCE = 0.4, 0.1
-"""Of the mean radiance of a patch."""
 OPTIONS = {"between_views": "none", "interpolation": "nearest", "refine": 1}
 """Each view stands for its square of the lens, each sample for its pixel."""
-
-
-@dataclass(frozen=True)
-class Effort:
-    """Pixels across patches, patches and size of a basis, pixels between patches, parallaxes by 1/FINE pixel."""
-
-    patch: int = 8
-    learned_from: int = 1200
-    rank: int = 96
-    stride: int = 4
-    parallaxes: tuple[int, ...] = tuple(range(-5, 2))
 
 
 QUICK = Effort(patch=6, learned_from=400, rank=64, stride=3, parallaxes=(-4, -2, 0))
@@ -123,105 +104,6 @@ def masks(shape: tuple[int, int]) -> dict[str, Array]:
     random = np.random.default_rng(0).random([n + 4 * VIEWS for n in shape]) < 0.5
     rows, columns = np.indices(random.shape) % VIEWS
     return {"random mask": random.astype(float), "pinholes": ((rows == 0) & (columns == 0)).astype(float)}
-
-
-# --- what light fields look like ---
-
-
-def atoms(picture: Array, effort: Effort) -> list[Array]:
-    """Of light fields of each parallax, a basis of their patches: principal components, by standard deviations.
-
-    Args:
-        picture: of another scene, FINE points to a pixel.
-        effort: how large patches are, and how many.
-
-    Returns:
-        For each parallax, (pixels of a patch, views, rank).
-    """
-    random = np.random.default_rng(0)
-    pixels = sliding_window_view(picture, (FINE, FINE)).mean((-1, -2))
-    views, across = np.arange(VIEWS) - VIEWS // 2, np.arange(effort.patch)
-    found = []
-    for parallax in effort.parallaxes:
-        steps = FINE * across - parallax * views[:, None]  # as things move from view to view
-        steps -= steps.min()
-        rows, columns = (random.integers(0, n - steps.max(), effort.learned_from) for n in pixels.shape)
-        patches = pixels[
-            (rows[:, None, None] + steps)[:, :, None, :, None],
-            (columns[:, None, None] + steps)[:, None, :, None, :],
-        ]
-        patches = patches.reshape(len(rows), -1)
-        patches = patches - patches.mean(1, keepdims=True)
-        _, sizes, basis = np.linalg.svd(patches / np.sqrt(len(rows)), full_matrices=False)
-        basis = (basis * sizes[:, None])[: effort.rank]
-        found.append(np.moveaxis(basis.reshape(len(basis), VIEWS**2, -1), 0, -1).swapaxes(0, 1).copy())
-    return found
-
-
-# --- from one picture to the light field ---
-
-
-def estimate(weights: Array, seen: Array, basis: Array, noise: float) -> tuple[float, Array, float]:
-    """The patch that is most to be expected, if all its parts have one parallax.
-
-    Args:
-        weights: (pixels, views), how much of each sample its pixel takes.
-        seen: (pixels,), the picture there.
-        basis: (pixels, views, rank).
-        noise: standard deviation.
-
-    Returns:
-        How well that explains what is seen (logarithm of its likelihood), coefficients of the basis, mean.
-    """
-    light = weights.sum(1)
-    pictures = (weights[:, None] @ basis)[:, 0]
-    known = MEAN_VARIANCE * np.outer(light, light) + noise**2 * np.eye(len(light))
-    evidence, found = [], []
-    for contrast in CONTRASTS:
-        factor = cho_factor(contrast * pictures @ pictures.T + known, lower=True)
-        solved = cho_solve(factor, seen - MEAN * light)
-        evidence.append(-solved @ (seen - MEAN * light) / 2 - np.log(np.diag(factor[0])).sum())
-        found.append(np.append(contrast * pictures.T @ solved, MEAN + MEAN_VARIANCE * light @ solved))
-    best = max(evidence)
-    shares = np.exp(np.array(evidence) - best)
-    mean = shares / shares.sum() @ np.array(found)
-    return best + float(np.log(shares.sum())), mean[:-1], float(mean[-1])
-
-
-def reconstructed(weights: Array, picture: Array, bases: list[Array], effort: Effort, noise: float) -> Array:
-    """The light field of one picture.
-
-    Args:
-        weights: of the samples, (views, views, rows, columns): in focus each is seen by one pixel, its own.
-        picture: white through the open lens at 1, noise included.
-        bases: of patches, one for each parallax.
-        effort: how large patches are, and how far apart.
-        noise: standard deviation of the picture's.
-
-    Returns:
-        (views, views, rows, columns).
-    """
-    picture = picture[::-1, ::-1]  # upright, as views are
-    n, (rows, columns) = effort.patch, (range(0, size - effort.patch + 1, effort.stride) for size in picture.shape)
-    evidence, found = np.zeros((len(rows), len(columns), len(bases))), {}
-    for j, row in enumerate(rows):
-        for i, column in enumerate(columns):
-            part = np.s_[..., row : row + n, column : column + n]
-            here, seen = weights[part].reshape(VIEWS**2, -1).T.astype(float), picture[part].reshape(-1)
-            for k, basis in enumerate(bases):
-                evidence[j, i, k], *found[j, i, k] = estimate(here, seen, basis, noise)
-    across = 3 / effort.stride  # neighbours decide together, over 3 pixels
-    evidence = gaussian_filter(evidence, (across, across, 0)) * max(1, 2 * np.pi * across**2)
-    shares = np.exp(evidence - evidence.max(2, keepdims=True))
-    shares /= shares.sum(2, keepdims=True)
-    total, count = np.zeros(weights.shape), np.zeros(picture.shape)
-    for (j, i, k), (coefficients, mean) in found.items():
-        if shares[j, i, k] > 0.01:
-            part = np.s_[..., rows[j] : rows[j] + n, columns[i] : columns[i] + n]
-            patch = (bases[k] @ coefficients + mean).T.reshape(VIEWS, VIEWS, n, n)
-            total[part] += shares[j, i, k] * patch
-            count[part[1:]] += shares[j, i, k]
-    return np.clip(total / np.maximum(count, 1e-9), 0, 1)
 
 
 # --- the experiment ---

@@ -34,6 +34,7 @@ THUMBNAILS = {
     "light-field-rendering": ("from-before", (0, 0, 1, 1)),
     "plenoptic": ("raw", (0.52, 0.05, 0.98, 0.95)),
     "angle-sensitive-pixels": ("recording", (0.52, 0.05, 0.98, 0.95)),
+    "compressive-light-field": ("recordings", (0.68, 0.1, 0.98, 0.95)),
     "dual-pixel": ("difference", (0, 0, 1, 1)),
     "wavefront-coding": ("scene-coded", (0, 0.2, 0.5, 0.7)),
     "diffuser-depth-of-field": ("scene-coded", (0, 0.2, 0.5, 0.7)),

@@ -98,6 +98,8 @@ LEFT_OUT: Mapping[str, str] = {
     "focal-sweep": "its sensor moves during the exposure, which the bench does not support: move the sensor on "
     "the bench, or export a film of a sweep of sensor.z",
     "coded-exposure": "its shutter flutters while the scene moves, and the bench shows static scenes only",
+    "compressive-light-field": "its mask has thousands of random cells near the sensor, and its views come from a "
+    "decoder that takes a minute: put a mask before the sensor of conventional",
     "tensor-display": "it shows a light field and records none",
     "cassi": "its scene has many bands, and light fields on the bench have no wavelengths",
 }

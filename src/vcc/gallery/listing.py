@@ -18,6 +18,7 @@ ENTRIES = (
     "good-apertures",
     "light-field-rendering",
     "plenoptic",
+    "compressive-light-field",
     "angle-sensitive-pixels",
     "integral-lens-prism",
     "biprism-stereo",
