@@ -86,6 +86,7 @@ BY_NAME = {
     "run.drive": "views in between need Numba",
     "run.operator": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "cli": "a command is loaded when it is called",
+    "gallery.learned_aperture": "PyTorch is loaded when the entry is run",
     "gallery.listing": "an entry is loaded when it is asked for",
     "zoo.decoders": "deepinv, and PyTorch with it, is loaded when it is asked for",
     "showcase.listing": "an entry is loaded when it is asked for",
@@ -101,7 +102,7 @@ NEVER = {"torch", "deepinv", "jax", "dask", "cupy", "tensorflow"}
 """Arrays of these come in through the array API; nothing here imports the libraries themselves."""
 
 LEARNING = {
-    "torch": re.compile(r"torch|(learn|run|zoo)\.torch_\w+"),
+    "torch": re.compile(r"torch|(gallery|learn|run|zoo)\.torch_\w+"),
     "jax": re.compile(r"jax|learn\.jax_\w+"),
 }
 """But these: they are for programs that use that library, and nothing else of ours imports them, but by name."""

@@ -31,6 +31,7 @@ THUMBNAILS = {
     "coded-aperture-refocusing": ("scene-coded-recorded", (0, 0, 1, 1)),
     "coded-aperture-depth": ("kernels", (0.03, 0.055, 0.21, 0.335)),
     "good-apertures": ("patterns", (0.604, 0.092, 0.799, 0.49)),
+    "learned-aperture": ("codes", (0.029, 0.085, 0.138, 0.297)),
     "light-field-rendering": ("from-before", (0, 0, 1, 1)),
     "plenoptic": ("raw", (0.52, 0.05, 0.98, 0.95)),
     "angle-sensitive-pixels": ("recording", (0.52, 0.05, 0.98, 0.95)),
@@ -87,7 +88,10 @@ def fingerprint(name: str) -> str:
         tree = ast.parse(sources[module])
         sources[module] = ast.unparse(without_docstrings(tree))
         for imported in ast.walk(tree):
-            if isinstance(imported, ast.ImportFrom) and (imported.module or "").startswith("vcc.gallery"):
+            if isinstance(imported, ast.Constant) and str(imported.value).startswith("vcc.gallery."):
+                by_name = str(imported.value).removeprefix("vcc.gallery.")
+                waiting += [by_name] if by_name not in sources else []
+            elif isinstance(imported, ast.ImportFrom) and (imported.module or "").startswith("vcc.gallery"):
                 inside = imported.module.removeprefix("vcc.gallery").lstrip(".")
                 others = [inside] if inside else [alias.name for alias in imported.names]
                 waiting += [each for each in others if (MODULES / f"{each}.py").exists() and each not in sources]

@@ -100,6 +100,8 @@ LEFT_OUT: Mapping[str, str] = {
     "coded-exposure": "its shutter flutters while the scene moves, and the bench shows static scenes only",
     "compressive-light-field": "its mask has thousands of random cells near the sensor, and its views come from a "
     "decoder that takes a minute: put a mask before the sensor of conventional",
+    "learned-aperture": "its code is learned in a minute with a network: open coded-aperture-refocusing, and "
+    "give its mask the learned cells",
     "tensor-display": "it shows a light field and records none",
     "cassi": "its scene has many bands, and light fields on the bench have no wavelengths",
 }

@@ -109,7 +109,8 @@ class Scene:
     def lens(self) -> Camera:
         """The camera without a mask: one pixel for each pixel of a view."""
         behind = 1 / (1 / self.focal_length - 1 / self.distance)
-        sensor = Sensor(behind, self.field.shape[2:4], self.slope * behind, electronics=ELECTRONICS)
+        rows, columns = self.field.shape[2:4]
+        sensor = Sensor(behind, (rows, columns), self.slope * behind, electronics=ELECTRONICS)
         return Camera([Lens(self.focal_length), Mask(Open(), VIEWS * self.spacing, name="stop")], sensor)
 
     def masked(self, cells: Array, shift: float) -> Camera:

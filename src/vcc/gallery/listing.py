@@ -15,6 +15,7 @@ ENTRIES = (
     "coded-aperture-refocusing",
     "coded-aperture-depth",
     "coded-aperture-real-lens",
+    "learned-aperture",
     "good-apertures",
     "light-field-rendering",
     "plenoptic",
