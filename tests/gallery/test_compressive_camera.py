@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -44,6 +45,13 @@ def test_weights_are_means_of_the_mask_where_rays_cross_it():
         down, right = (np.bincount(each, minlength=cells.shape[0]) / each.size for each in axes)
         # A share of light on the wrong side of an edge: at most 1/60 of a square for each of some 4 edges crossed.
         assert weights[row, column, y, x] * 25 == pytest.approx(down @ cells @ right, abs=4 / 60)
+
+
+def test_what_is_tuned_on_has_the_disparities_of_the_scene():
+    like = replace(compressive.scene_of(bench_for(seen(5)), 40), disparities=(0.0, 1.0))
+    found = compressive.training_scene(like, 60).field.measured_disparity_range()
+    # Rounding to 1/4 pixel; a measured range is a little wider than the scene.
+    assert found == pytest.approx((0.0, 1.0), abs=0.35)
 
 
 def test_the_estimate_is_the_conditional_mean(monkeypatch):

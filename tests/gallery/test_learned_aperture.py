@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.signal import convolve2d
 
 import vcc
 from vcc.base.units import mm
@@ -43,6 +44,20 @@ def test_light_of_a_cell_lands_where_its_ray_does(spreads, row, column):
         assert kernel.sum() == pytest.approx(1 / 49, rel=1e-5)
         assert places @ kernel.sum(axis=1) / kernel.sum() == pytest.approx(-(row - 3) * blur, abs=1e-4)
         assert places @ kernel.sum(axis=0) / kernel.sum() == pytest.approx(-(column - 3) * blur, abs=1e-4)
+
+
+def test_recordings_are_convolutions_with_the_kernels(spreads):
+    code, target = learned.random_code(1, 0.5), np.random.default_rng(0).random((40, 44))
+    for number, kernel in zip(SHOWN, spreads(torch.as_tensor(code)).numpy(), strict=True):
+        camera = learned.camera_of(code, 24)
+        image = camera.capture(
+            learned.flat(target, learned.distance_of(learned.BLURS[number])), between_views="none"
+        )
+        # Radiance 1 through the whole opening is an irradiance of (A / z)².
+        shares = image.upright().to_numpy() * (camera.sensor.z / learned.OPENING) ** 2
+        made = convolve2d(target, kernel, mode="same")[8:-8, 10:-10]
+        # All distances show the target at one scale, so that only float32 rounding is left.
+        np.testing.assert_allclose(shares, made, atol=1e-6)
 
 
 def test_gradients_are_differences_of_images(spreads):

@@ -41,6 +41,8 @@ WIDE = 0.32
 """Field of view on the built-in scene, as a slope."""
 MOST_PARALLAX = 1.5
 """Largest range of disparities, pixels per view; finer views are averaged."""
+FARTHEST = 3
+"""Largest disparity, pixels per view, likewise."""
 ELECTRONICS = Electronics(full_well=10_000, gain=0.4, bit_depth=12, read_noise=2.5)
 SHIFTS = (0.25, 0.5, 1.0, 2.0)
 """Pixels by which the mask's shadow moves from view to view: these distances are tried."""
@@ -215,13 +217,14 @@ def scene_of(bench: Bench, side: int) -> Scene:
         spacing, slope = abs(float(frame[0, 0])), abs(float(frame[2, 2]))
         vergence = max(float(frame[2, 0] / frame[0, 0]), 0.0)
         parallax = part * spacing * (1 / bench.near - 1 / bench.far) / slope
-        pixels = max(1, math.ceil(parallax / MOST_PARALLAX))
+        largest = max(abs(part * spacing * (1 / z - vergence) / slope) for z in (bench.near, bench.far))
+        pixels = max(1, math.ceil(parallax / MOST_PARALLAX), math.ceil(largest / FARTHEST))
         size = min(nt // pixels, side), min(ns // pixels, side)
         if min(size) < SMALLEST:
             raise InputError(
-                f"disparities of this light field span {parallax:.2g} pixels between {VIEWS}×{VIEWS} "
-                f"views; averaged to {MOST_PARALLAX:g}, views of {nt}×{ns} pixels are smaller than "
-                f"{SMALLEST}×{SMALLEST}: give larger ones, or with less parallax"
+                f"disparities of this light field span {parallax:.2g} pixels between {VIEWS}×{VIEWS} views, and "
+                f"reach {largest:.2g}; averaged to {MOST_PARALLAX:g} and {FARTHEST}, views of {nt}×{ns} pixels "
+                f"are below {SMALLEST}×{SMALLEST}: give larger ones, or with less parallax"
             )
         top, left = ((n - pixels * kept) // 2 for n, kept in zip((nt, ns), size, strict=True))
         views = views[:, :, top : top + pixels * size[0], left : left + pixels * size[1]]
@@ -249,12 +252,12 @@ def training_scene(like: Scene, side: int) -> Scene:
     """
     low, high = like.disparities
     views, across = np.arange(VIEWS) - VIEWS // 2, FINE * np.arange(side)
-    sheets = [drawn("dense", FINE * (side + 12), TRAINING_SEED + n) for n in range(3)]
+    sheets = [drawn("dense", FINE * (side + 4 * FARTHEST + 1), TRAINING_SEED + n) for n in range(3)]
     shapes = [sheet.T for sheet in sheets]
     made = np.zeros((VIEWS, VIEWS, side, side), np.float32)
     for n, disparity in enumerate(np.linspace(low, high, 3)):
-        # A near object moves towards larger columns from one view to the next.
-        steps = [np.rint(FINE * (6 - disparity * view)).astype(int) + across for view in views]
+        # A near object moves towards smaller columns from one view to the next.
+        steps = [np.rint(FINE * (2 * FARTHEST + disparity * view)).astype(int) + across for view in views]
         cut = [np.lib.stride_tricks.sliding_window_view(each, (FINE, FINE)) for each in (sheets[n], shapes[n])]
         for row, column in np.ndindex(VIEWS, VIEWS):
             place = np.ix_(steps[row], steps[column])

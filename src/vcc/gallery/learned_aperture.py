@@ -44,7 +44,7 @@ TRAINING_SEEDS, TEST_SEED, CODE_SEEDS = (31, 32, 33, 34), 41, (1, 2)
 BETTER = 0.9
 """Ratio of errors from which a code counts as better: codes are learned once, from one start."""
 SHARE = 0.5
-"""Of the cells, open: the light of all codes but the open one."""
+"""Of the cells, open: the light of all codes but the open and the published one."""
 
 
 def distance_of(blur: float) -> float:
