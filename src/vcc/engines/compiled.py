@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 from numba.core.caching import FunctionCache
 from numba.core.sigutils import normalize_signature
 
@@ -77,7 +77,8 @@ def compiled(borrowing: bool = False, **options: Any) -> Callable[[Callable[...,
             function
         )
         dispatcher._cache = _Kept(function)  # as dispatcher.enable_caching() does
-        dispatcher._compiler.compile = _without_collection(dispatcher._compiler.compile)
+        if not config.DISABLE_JIT:  # else, as in the simulator of GPUs, the function stays as it is
+            dispatcher._compiler.compile = _without_collection(dispatcher._compiler.compile)
         return dispatcher
 
     return made
