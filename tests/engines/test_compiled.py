@@ -1,5 +1,6 @@
 """Kernels work if their machine code cannot be cached, or if the cached code is damaged."""
 
+import gc
 import importlib.util
 import sys
 import tempfile
@@ -11,6 +12,7 @@ from typing import Any
 
 import numba
 import pytest
+from numba.core import event
 
 from vcc.engines import compiled
 from vcc.errors import CacheWarning
@@ -58,6 +60,32 @@ def test_code_is_kept_beside_its_source_and_read_again(loaded: Load, tmp_path: P
     assert list((tmp_path / "__pycache__").glob("kernel.doubled*.nbc"))
     assert second(21) == 42
     assert (was_read(first), was_read(second)) == (False, True)
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_garbage_is_not_collected_while_code_is_compiled(loaded: Load, enabled: bool) -> None:
+    found = []
+
+    class Seen(event.Listener):
+        def on_start(self, _: event.Event) -> None:
+            found.append(gc.isenabled())
+
+        def on_end(self, _: event.Event) -> None:
+            found.append(gc.isenabled())
+
+    was = gc.isenabled()
+    try:
+        (gc.enable if enabled else gc.disable)()
+        with event.install_listener("numba:run_pass", Seen()):
+            assert loaded()(21) == 42
+        assert gc.isenabled() is enabled
+        with pytest.raises(numba.TypingError):
+            loaded()({})
+        assert gc.isenabled() is enabled
+    finally:
+        (gc.enable if was else gc.disable)()
+    assert found
+    assert not any(found)
 
 
 @pytest.mark.parametrize("changed", ["called", "constants"])

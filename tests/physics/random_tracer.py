@@ -675,10 +675,10 @@ def _real_lens(element: Any) -> list[Sheet]:
             if each.stop and element.mask is not None:
                 for one in _pattern(element.mask, (0.0, 0.0)):
                     weight = weight * one.at(place[0], place[1])
-            steep = _sag(each, away)[1]
-            normal = np.stack([steep * place[0], steep * place[1], -np.ones(away.shape)])
-            normal[:2] /= np.maximum(away, 1e-300)
-            normal /= np.sqrt((normal**2).sum(axis=0))
+            steep = _steepness(each, away)
+            level = 1 / np.sqrt(1 + steep * steep)
+            steep *= level / np.maximum(away, 1e-300)
+            normal = np.stack([steep * place[0], steep * place[1], -level])
             cosine, ratio = -(way * normal).sum(axis=0), each.index / n
             normal, cosine = np.where(cosine < 0, -normal, normal), np.abs(cosine)
             inner = 1 - ratio**2 * (1 - cosine**2)
@@ -708,16 +708,28 @@ class _Aimed(Opening):
         return np.ones(np.broadcast_shapes(x.shape, y.shape))
 
 
-def _sag(surface: Any, r: Array) -> tuple[Array, Array]:
-    """(z, dz/dr) of a conic with even powers added: z from its own quadratic, c·r² − 2z + c(1 + k)z² = 0."""
+def _sag(surface: Any, squared: Array) -> Array:
+    """z at r² of a conic with even powers added, from its own quadratic: c·r² − 2z + c(1 + k)z² = 0."""
     c, shape = 1 / surface.radius, (1 + surface.conic) / surface.radius
     with np.errstate(invalid="ignore"):
-        root = np.sqrt(1 - c * shape * r * r)
-        z = c * r * r / 2 if shape == 0 else (1 - root) / shape
-    slope = c * r / root
+        z = c * squared / 2 if shape == 0 else (1 - np.sqrt(1 - c * shape * squared)) / shape
+    power = squared
+    for a in surface.aspheres:
+        power = power * squared  # r⁴, r⁶, …
+        z = z + a * power
+    return np.asarray(z)
+
+
+def _steepness(surface: Any, r: Array) -> Array:
+    """dz/dr of `_sag`."""
+    c, squared = 1 / surface.radius, r * r
+    with np.errstate(invalid="ignore"):
+        slope = c * r / np.sqrt(1 - c * c * (1 + surface.conic) * squared)
+    power = r
     for n, a in enumerate(surface.aspheres):
-        z, slope = z + a * r ** (2 * n + 4), slope + (2 * n + 4) * a * r ** (2 * n + 3)
-    return z, slope
+        power = power * squared  # r³, r⁵, …
+        slope += (2 * n + 4) * a * power
+    return np.asarray(slope)
 
 
 def _on_surface(place: Array, way: Array, surface: Any, vertex: float) -> Array:
@@ -731,7 +743,7 @@ def _on_surface(place: Array, way: Array, surface: Any, vertex: float) -> Array:
 
     def above(h: Array) -> Array:
         at = place + h * way
-        return np.asarray(at[2] - vertex - _sag(surface, np.hypot(at[0], at[1]))[0])
+        return np.asarray(at[2] - vertex - _sag(surface, at[0] * at[0] + at[1] * at[1]))
 
     one = (vertex - place[2]) / way[2]
     other = one + 1e-4

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from vcc.base.units import mm
+from vcc.plan.footprints import detail
 from vcc.plan.footprints.detail import _means_around, detail_lost
 from vcc.plan.footprints.planes import Plane
-from vcc.shapes.patterns import Cells, CosineSum, FunctionPattern
+from vcc.shapes.patterns import Bounded, Cells, CosineSum, FunctionPattern
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -47,3 +48,31 @@ def test_of_cells_as_much_however_many_there_are(number):
     lost = detail_lost(plane, np.zeros(2), np.full(2, mm))
     # Looked at in 8 parts of a cell, so over 64×64 cells, or in 5 and in 1, less what falls between these points.
     assert lost == pytest.approx((1 - (2 / 3) ** 2), rel=0.2)
+
+
+def test_what_is_found_is_kept_for_equal_patterns_but_not_for_functions(monkeypatch):
+    computed = []
+    monkeypatch.setattr(detail, "_kept", {})
+    monkeypatch.setattr(detail, "KEPT", 2)
+    compute = detail._details_lost
+    monkeypatch.setattr(detail, "_details_lost", lambda *given: computed.append(given) or compute(*given))
+
+    def lost(pattern, box):
+        plane = Plane(pattern, "mask", (0.0, 0.0), np.zeros((2, 4)), np.zeros(2))
+        before = len(computed)
+        return detail_lost(plane, np.zeros(2), np.full(2, box)), len(computed) - before
+
+    def cells(shift=0.0):
+        return Bounded(Cells(np.eye(4) * 0.5 + shift, 4 * mm, 4 * mm), 3 * mm, 3 * mm)
+
+    (first, once), (again, not_again) = lost(cells(), mm), lost(cells(), mm)
+    assert (first, once, not_again) == (again, 1, 0)
+    assert lost(cells(), 2 * mm)[0] != first
+    assert lost(cells(0.25), mm)[0] != first
+    share = 1.0
+    bright = FunctionPattern(lambda x, y: share * (x > 0) + 0 * y)
+    step, _ = lost(Bounded(bright, 4 * mm, 4 * mm), mm)
+    share = 0.0  # a function may return something else next time
+    assert step > 0
+    assert lost(Bounded(bright, 4 * mm, 4 * mm), mm) == (0.0, 1)
+    assert len(detail._kept) <= 2

@@ -63,6 +63,13 @@ def content(thing: Any) -> Hashable:
     return thing if isinstance(thing, Number) else (type(thing), thing)  # 1 and 1.0 are equal
 
 
+def has_identity(key: Hashable) -> bool:
+    """Whether a key from `content` contains an object that is compared by identity, for instance a function."""
+    if isinstance(key, tuple):
+        return key[:1] == ("identity",) or any(map(has_identity, key))
+    return not (key is None or isinstance(key, Number | str | bytes | type))
+
+
 # --- a name for the content of a value: for equal values the same in all runs and on all machines ---
 
 

@@ -18,7 +18,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
-from vcc.engines.rays_compiled import TILE, given, light_field
+from vcc.engines.rays_compiled import TILE, given, light_field, working_arrays
 from vcc.plan.parameters import parameters
 from vcc.plan.rays import edges, steps
 from vcc.plan.rays.bounds.windows import CellWindows, Window
@@ -75,7 +75,7 @@ def ray_gradients(
 
         def of_group(tiles: NDArray[np.int64]) -> tables.RayGradients:
             gradients = empty()
-            back(pool.ended, gradients, tiles)
+            back(pool.ended, gradients, tiles, working_arrays(), _ways(len(packed.codes)))
             return gradients
 
         for done, gradients in enumerate(pool.map(of_group, groups), start=1):
@@ -85,6 +85,13 @@ def ray_gradients(
             tell(progress, pixels * done // len(groups), pixels)
     found = _named(core, packed, total)
     return {name: np.asarray(found.get(name, np.zeros(shapes[name]))).reshape(shapes[name]) for name in wanted}
+
+
+def _ways(steps: int) -> tuple[Array, ...]:
+    """Buffers for `vcc.engines.ray_loops.packet_back`."""
+    rays = kernels.PACKET
+    kept, lit, bar, found = (np.empty(shape) for shape in ((steps + 2, 5, rays), rays, (5, rays), (2, rays)))
+    return kept, lit, bar, found, np.empty((2, 4))
 
 
 def _groups(raster_shape: tuple[int, int], size: int) -> list[NDArray[np.int64]]:

@@ -2,7 +2,8 @@
 
 One loop serves every camera: the steps of a ray are a list of numbers, `vcc.engines.ray_steps`. A packet holds
 the rays of one pixel. Its stages are separate functions, compiled once for all loops and all types of samples:
-inlined in each loop, they took three times as long to compile.
+inlined in each loop, they took three times as long to compile. Python allocates the arrays that loops work in: a
+wrapper kernel that did so was optimised with the whole loop in it a second time.
 
 `add_pixels` sums the samples that the rays of each pixel read. The transpose to samples has two stages, because
 rays of neighbouring pixels read the same samples. `find_tile` traces the rays and sorts them by the view that
@@ -16,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import fast_loop, ordered_loop, ray_back, ray_back_inlined, ray_inlined, ray_loop
+from vcc.engines.compiled import ray_back, ray_back_inlined, ray_inlined, ray_loop
 from vcc.engines.ray_aims import (
     aim_rays,
     at_pixel,
@@ -44,7 +45,7 @@ from vcc.engines.ray_lookup import (
     weights_in_four_views,
 )
 from vcc.engines.ray_steps import moved_back, packet_of, step_back, step_on, take_few_steps, take_steps
-from vcc.engines.ray_tables import Drawn, Packet
+from vcc.engines.ray_tables import Drawn
 from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spread_views_of_4
 from vcc.plan.rays.points import DIGITS
 
@@ -52,20 +53,12 @@ PACKET = 256
 """Rays of a packet: their six numbers each stay in the first-level cache."""
 
 
-@ordered_loop
-def working_arrays():  # type: ignore[no-untyped-def]
-    """Buffers for tracing: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
-    rays = Packet(np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET), np.empty(PACKET))
-    return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
-
-
 @ray_loop
 def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile into pictures (2, rows, columns, channels); arguments: `vcc.engines.ray_tables`.
 
     The first picture is the sum over all rays of a pixel, the second the difference of the two halves. The
-    kernel returns once ``ended[0]`` is true (cancelled). Python calls it directly: a wrapper kernel that
-    allocated the arrays took a third of the compile time.
+    kernel returns once ``ended[0]`` is true (cancelled).
 
     Args:
         field: whole views, or parts of them.
@@ -75,7 +68,7 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
         steps: the steps of the rays.
         few: True if all steps are in `FEW`, else None.
         rare: None if all steps are in `FEW`, else True.
-        within: as returned by `working_arrays`.
+        within: as returned by `vcc.engines.rays_compiled.working_arrays`.
         sums: of a packet, float32, and of a pixel, (2, lanes) each; and the number of traced rays, (1,).
     """
     table, samples, _, seed = points
@@ -179,20 +172,16 @@ def put_in_order(found, filled):  # type: ignore[no-untyped-def]
     begin[0] = 0
 
 
-@ordered_loop
-def find_tile(look, sensor, points, aim, steps, ended, start, tile, found):  # type: ignore[no-untyped-def]
+@ray_loop
+def find_tile(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile from its pixel ``start`` on, until the buffers for their places are full.
+
+    ``within``: as returned by `vcc.engines.rays_compiled.working_arrays`.
 
     Returns:
         The number, in the tile, of the first pixel that was not traced; the number of pixels if all were.
         Undefined once ``ended[0]`` is true.
     """
-    return find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, working_arrays())
-
-
-@ray_loop
-def find_pixels(look, sensor, points, aim, steps, ended, start, tile, found, within):  # type: ignore[no-untyped-def]
-    """As `find_tile`, with buffers from `working_arrays`."""
     table, samples, _, seed = points
     cells = aim.cells
     rays, near, images, flipped = within
@@ -329,21 +318,14 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gr
         pixel_back(drawn, place, bar, gradients.sensor)
 
 
-@fast_loop
-def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradients, tiles):  # type: ignore[no-untyped-def]
+@ray_back
+def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
     """Add the gradients of the pixels of some tiles to ``gradients``; arguments: `vcc.engines.ray_tables`.
 
-    ``weights``: of the image, (rows, columns, channels). ``tiles``: (tiles, 4). The kernel returns once
-    ``ended[0]`` is true (cancelled).
+    ``weights``: of the image, (rows, columns, channels). ``tiles``: (tiles, 4). ``within``: as returned by
+    `vcc.engines.rays_compiled.working_arrays`. ``ways``: see `packet_back`. The kernel returns once ``ended[0]``
+    is true (cancelled).
     """
-    kept = np.empty((len(steps.codes) + 2, 5, PACKET))
-    ways = kept, np.empty(PACKET), np.empty((5, PACKET)), np.empty((2, PACKET)), np.empty((2, 4))
-    gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, working_arrays(), ways)
-
-
-@ray_back
-def gradients_within(field, sensor, points, aim, steps, weights, ended, gradients, tiles, within, ways):  # type: ignore[no-untyped-def]
-    """As `gradients_of_tiles`, with buffers from `working_arrays` and for `packet_back`."""
     table, samples, _, seed = points
     cells = aim.cells
     _, near, images, flipped = within

@@ -20,7 +20,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import ray_loops as kernels
 from vcc.engines import ray_tables as tables
-from vcc.engines.rays_compiled import TILE, given
+from vcc.engines.rays_compiled import TILE, given, working_arrays
 from vcc.plan.rays.model import Rays
 
 KEPT = 2**19
@@ -122,7 +122,7 @@ class _Kept:
 
     def _traced(self, slot: int, part: tuple[int, tables.Tile]) -> int:
         found = tables.Found(self._places[slot], self._views[slot], self.ordered[slot], self.begin[slot])
-        return int(self._find(*part, found))
+        return int(self._find(*part, found, working_arrays()))
 
 
 def _pixels(tile: tables.Tile, rows: int, columns: int) -> int:

@@ -104,10 +104,14 @@ def _tile(*given: Any) -> int:
     """Trace the pixels of a tile with `kernels.add_pixels`, in new buffers; return the number of traced rays."""
     lanes = max(given[0].samples.channels, LANES)
     sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, dtype=np.int64)
-    near, images, flipped = np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
-    rays = tables.Packet(*np.empty((5, kernels.PACKET)))
-    kernels.add_pixels(*given, (rays, near, images, flipped), sums)
+    kernels.add_pixels(*given, working_arrays(), sums)
     return int(sums[2][0])
+
+
+def working_arrays() -> tuple[tables.Packet, NDArray[np.int64], NDArray[np.float64], NDArray[np.int64]]:
+    """Buffers in which a kernel traces: (rays, near, images, flipped); see `cells_at` and `turn_to`."""
+    rays = tables.Packet(*np.empty((5, kernels.PACKET)))
+    return rays, np.empty((256, 2), dtype=np.int64), np.empty((2, 5)), np.empty(4, dtype=np.int64)
 
 
 def given(core: Rays, beside: int) -> tuple[tables.Sensor, tables.Points, tables.Aim, tables.Steps]:

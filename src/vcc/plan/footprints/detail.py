@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.base.values import content, has_identity
 from vcc.plan.footprints.planes import Plane
 from vcc.shapes.patterns import Cells, Pattern
 from vcc.shapes.stacked_patterns import Product, Shifted, product_of_means
@@ -20,6 +21,10 @@ PATCHES = 8
 """Patches along a side of a pattern that is too fine for so many points: only these parts of it are sampled."""
 ARRAYS_AT_ONCE = 64
 """Arrays of cells that are processed in one batch."""
+KEPT = 1024
+"""Losses that are kept. Pieces of a light field, and cameras that share a mask, need the same ones again."""
+
+_kept: dict[Hashable, float] = {}
 
 
 def _fine_means(pattern: Pattern, x: Array, y: Array, width: float, height: float) -> Array:
@@ -65,7 +70,16 @@ def detail_lost(plane: Plane, known: Array, added: Array) -> float:
     def looked_at(x: Array, y: Array, cell: tuple[float, float]) -> Array:
         return np.broadcast_to(_fine_means(plane.pattern, x[None, :], y[:, None], *cell), (y.size, x.size))[None]
 
-    return float(_details_lost(plane.pattern.size, looked_at, known, added)[0])
+    pattern = content(plane.pattern)
+    key = pattern, known.tobytes(), added.tobytes()
+    lost = _kept.get(key)
+    if lost is None:
+        lost = float(_details_lost(plane.pattern.size, looked_at, known, added)[0])
+        if not has_identity(pattern):  # a user's function may return something else next time
+            if len(_kept) >= KEPT:
+                _kept.clear()
+            _kept[key] = lost
+    return lost
 
 
 def details_lost(cells: Cells, values: Array, known: Array, added: Array) -> Array:
