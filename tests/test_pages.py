@@ -35,6 +35,7 @@ from vcc.sources import CameraArray
 from vcc.zoo import run as run_zoo
 from vcc.zoo import scenes
 from vcc.zoo.running import _entrants
+from vcc.zoo.torch_design import ARMS, Outcome
 
 ROOT = Path(__file__).parents[1]
 NOTEBOOKS = ROOT / "docs" / "notebooks"
@@ -268,6 +269,11 @@ def names(folder):
     ELEMENT_KINDS.update(kinds)
 
 
+def designed(output, plan, progress):
+    """What `vcc zoo design` reports; tests/zoo has it."""
+    return [Outcome(arm, seed, plan.share, (20.0, 20.0, 20.0), 1.0) for arm in ARMS for seed in range(plan.seeds)]
+
+
 def few_results(task, output, **given):
     """What `vcc zoo run` does, for one scene of few views, the open square and the reader's camera and decoder."""
     chosen = vcc.zoo.TASKS[task]
@@ -294,6 +300,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(scenes, "VIEWS", 3)
     scenes.scene.cache_clear()
     monkeypatch.setattr("vcc.cli.zoo.run.run_zoo", few_results)
+    monkeypatch.setattr("vcc.zoo.torch_design.designed", designed)
     # Processes and clusters take seconds to begin, and tests/run has them.
     for executor in ("concurrent.futures.ProcessPoolExecutor", "distributed.Client"):
         monkeypatch.setattr(executor, lambda *_, **__: ThreadPoolExecutor(1))

@@ -185,6 +185,14 @@ ZOO = {
         "Write a page of a run: tables, quality over light, and a strip of pictures.",
         "vcc zoo page zoo.zarr -o page",
     ),
+    "design": (
+        "Learn an aperture code and its decoder together, and decoders of its controls: the round stop of its "
+        "light, a random code, and the open square.\n\n"
+        "The code can be made: it is binary and symmetric, and has an exact number of open cells and no smaller "
+        "hole or bar than stated. The same command resumes an interrupted design. vcc zoo run scores it.",
+        "vcc zoo design --task edof -o design",
+        "vcc zoo design --task edof -o design --light 0.1 --symmetry left-right --seeds 5",
+    ),
 }
 """Likewise: ``vcc zoo NAME`` is the function NAME in ``vcc.cli.zoo.NAME``."""
 

@@ -13,6 +13,7 @@ import torch
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.learn.fabrication import Fabrication
 
 _SHARE = "vcc_share_of_light"
 """The attribute in which tensors of `total_light` store their share."""
@@ -74,6 +75,31 @@ def _brightest(mask: torch.Tensor, share: float) -> torch.Tensor:
     ranked = torch.argsort(mask.flatten(-2)[..., evenly], dim=-1, descending=True, stable=True)
     found = torch.zeros_like(mask).flatten(-2)
     return found.scatter(-1, evenly[ranked[..., :opened]], 1.0).reshape(mask.shape)
+
+
+def fabricable(mask: torch.Tensor, share: float, feature: int = 1, symmetry: str = "none") -> torch.Tensor:
+    """A binary code that can be made, of high values; straight-through gradients.
+
+    See `vcc.learn.fabrication.Fabrication`: the number of open cells is exact, no hole and no bar is smaller than
+    ``feature`` × ``feature`` cells, and the code is symmetric. The gradient is that of `binary`.
+
+    Args:
+        mask: any numbers, (rows, columns), both equal: transmissions, or free numbers without another constraint.
+        share: of the light; at most half a group of mirrored cells (0.5, 1 or 2 cells) is rounded.
+        feature: side of the smallest hole and bar, cells.
+        symmetry: "none", "left-right", or "both": left-right and up-down.
+
+    Returns:
+        Zeros and ones, in the mask's type and shape.
+
+    Raises:
+        InputError: an invalid share, feature, symmetry or shape, or no such code was found.
+    """
+    if mask.ndim != 2 or mask.shape[0] != mask.shape[1]:
+        raise InputError(f"a code to be made has as many rows as columns, and the mask has {tuple(mask.shape)}")
+    kept = Fabrication(mask.shape[0], share, feature, symmetry)
+    found = torch.from_numpy(kept.nearest(mask.detach().to(torch.float64).numpy()))
+    return _straight_through(mask, found.to(mask.dtype))
 
 
 def levels(number: int) -> Callable[[torch.Tensor], torch.Tensor]:
@@ -138,4 +164,4 @@ def _shift(odds: torch.Tensor, share: float) -> torch.Tensor:
 
 
 def _straight_through(mask: torch.Tensor, rounded: torch.Tensor) -> Any:
-    return mask + (rounded - mask).detach()
+    return rounded.detach() + (mask - mask.detach())  # exactly the rounded values

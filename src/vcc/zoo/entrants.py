@@ -237,6 +237,11 @@ class FromFile:
         """
         return _function(self)
 
+    def takes(self, camera: Camera) -> bool:
+        """Whether the function is one for this camera: if it has an attribute ``takes``, the value of that."""
+        takes = getattr(self.load(), "takes", None)
+        return takes is None or bool(takes(camera))
+
 
 @lru_cache(maxsize=32)
 def _function(of: FromFile) -> Any:

@@ -102,7 +102,8 @@ def run(
         scenes: names of scenes, or paths of light fields and splats (`vcc.zoo.scenes.scene`).
         seeds: number of recordings of each scene at each light level.
         cameras: further camera files, each with all decoders.
-        own_decoders: further decoders, "my.py:decode", each with all cameras.
+        own_decoders: further decoders, "my.py:decode", each with all cameras, or with those for which its
+            attribute ``takes``, a function of a camera, is true.
         without: names of decoders or cameras to leave out.
         executor: runs the trials: a `concurrent.futures.Executor` or a ``dask.distributed.Client``; each worker
             makes the scenes itself, and reads files by the same paths. None uses this process.
@@ -187,7 +188,7 @@ def _trial(
     suited = {
         decoder: function
         for decoder, function in functions.items()
-        if function is not None or not entrant.decoders or decoder in entrant.decoders
+        if (function.takes(entrant.camera) if function else not entrant.decoders or decoder in entrant.decoders)
     }
     keys = tuple(
         fingerprint(*known, decoder, () if function is None else (function.function, function.digest))
