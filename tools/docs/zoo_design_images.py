@@ -78,7 +78,8 @@ def main() -> None:
 
 def draw(report: Report, design: Path, stop: str, seeds: int) -> None:
     """Apertures, recordings and decoded pictures of a scene."""
-    shown = [(f"learned-{n}", n) for n in range(seeds)] + [("random-0", 0), (stop, 0), ("open", 0)]
+    shown = [*((f"learned-{n}", n) for n in range(seeds)), ("random-0", 0), (stop, 0), ("open", 0)]
+    shown = [(camera, n) for camera, n in shown if f"decoder:decode_{n}" in report.decoders(camera)]
     apertures, recorded, decoded = [], [], []
     for camera, seed in shown:
         (one,) = [
