@@ -14,8 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
+
+from vcc.base import checks
+
+with checks.package("decoders that learn", "torch", "torch"):
+    import torch
 
 from vcc.base.cached import cached
 from vcc.base.errors import InputError

@@ -15,7 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
+
+from vcc.base import checks
+
+with checks.package("vcc zoo design", "torch", "torch"):
+    import torch
 
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
