@@ -195,14 +195,17 @@ class Parts(Brief):
 
 
 def _parts(design: Design, masks: torch.Tensor, stop: Camera) -> tuple[torch.Tensor, torch.Tensor]:
-    """The light and the kernels of all parts. The kernel of a cell is that of its column times that of its row."""
+    """The light and the kernels of all parts. The kernel of a cell is that of its column times that of its row.
+
+    Rays on the border of two pixels may count for the other one than in `Kernels`: 2 of 364 across at most.
+    """
     camera, blurs = design.camera("open", None), np.array(design.zoo_task.blurs)
     u = ((np.arange(RAYS) + 0.5) / RAYS - 0.5) * SIDE
     lines = []
     for blur in blurs:
         rays = np.stack([u, 0 * u, u / distance_of(float(blur)), 0 * u], axis=-1)
         x = trace(camera, rays).positions[:, -1, 0] / camera.sensor.pitches[1]
-        lines.append(-((np.floor(2 * x).astype(int) + 1) // 2))  # upright; ties as in `Kernels`
+        lines.append(-((np.floor(2 * x).astype(int) + 1) // 2))  # upright
     round_one = Kernels.of(stop, blurs)
     reach = max(int(np.abs(lines).max()), round_one.values.shape[-1] // 2)
     across = np.zeros((design.cells, len(blurs), 2 * reach + 1))
