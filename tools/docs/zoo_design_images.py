@@ -48,8 +48,7 @@ def main() -> None:
     parser.add_argument("store", type=Path)
     asked = parser.parse_args()
     report = Report.of(asked.store, "edof")
-    stop = str(report.first("learned-0").about["control"])
-    short = str(report.shorter("learned-0"))
+    stop, short = report.controls("learned-0")
     cameras = [("learned-{}", "learned code"), ("random-{}", "random code"), (stop, stop), ("open", "open square"),
                (short, short)]  # fmt: skip
     learned = "decoder:decode_{}"

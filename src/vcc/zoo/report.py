@@ -101,11 +101,15 @@ class Report(Brief):
             ]
         )
 
+    def decoders(self, camera: str) -> list[str]:
+        """The decoders that were run for a camera, in order."""
+        names = (str(each.about["decoder"]) for each in self.found if each.about["camera"] == camera)
+        return list(dict.fromkeys(names))
+
     def best(self, camera: str, level: int) -> str:
         """The decoder with the best mean of the first measure."""
         sign = 1 if self.task.measures[0].larger else -1
-        suited = [name for name in self.names("decoder") if len(self.by_scene(camera, name, level))]
-        return max(suited, key=lambda name: sign * self.by_scene(camera, name, level).mean())
+        return max(self.decoders(camera), key=lambda name: sign * self.by_scene(camera, name, level).mean())
 
     def controls(self, camera: str) -> tuple[str, ...]:
         """The names of the controls of a camera; none for controls."""

@@ -151,7 +151,7 @@ class Decoders:
             raise InputError(f"the decoders of {self.path} were trained with other cameras than this one")
         values, kernels = (
             torch.from_numpy(np.ascontiguousarray(each, np.float32))
-            for each in (recorded.values, recorded.kernels.values)
+            for each in (recorded.values, recorded.traced.values)
         )
         with one_thread(), torch.no_grad():
             found = network(values[None], kernels, torch.tensor([recorded.noise], dtype=torch.float32))

@@ -31,7 +31,7 @@ from vcc.learn.torch_electronics import expose
 from vcc.learn.torch_module import CameraModule
 from vcc.optics.mask import Mask
 from vcc.plot.tracing import trace
-from vcc.zoo.bench import ELECTRONICS, RAYS, SIDE, Kernels, distance_of, exposure_time, of_lens, sensor
+from vcc.zoo.bench import ELECTRONICS, FOCUS, RAYS, SIDE, Kernels, distance_of, exposure_time, of_lens, sensor
 from vcc.zoo.entrants import open_square, round_stop
 from vcc.zoo.scenes import identity, scene
 from vcc.zoo.task import Task
@@ -84,7 +84,7 @@ class Design:
             raise InputError(
                 f"cells is {self.cells}: the calibration traces {RAYS} rays across, so take 7, 13, 14, 26 or 28"
             )
-        round_stop(self.share, self.zoo_task.focus)
+        round_stop(self.share, FOCUS)
 
     @property
     def zoo_task(self) -> Task:
@@ -103,7 +103,7 @@ class Design:
 
     def camera(self, arm: str, code: Array | None) -> Camera:
         """The camera of an arm."""
-        focus = self.zoo_task.focus
+        focus = FOCUS
         if code is not None:
             return of_lens(Mask(code, width=SIDE, name="code"), focus=focus)
         return round_stop(round(self.share, 4), focus).camera if arm == "round" else open_square(focus)
