@@ -34,10 +34,11 @@ from vcc.shapes.surface import Surface
 
 
 def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
-    """Concrete subclasses of ``base`` in the modules, by their names in a file: CosineSum is "cosine_sum"."""
+    """Concrete public subclasses of ``base`` in the modules, by their names in a file: CosineSum is "cosine_sum"."""
     things = [(thing, module) for module in modules for thing in vars(module).values() if inspect.isclass(thing)]
     own = [kind for kind, module in things if kind.__module__.startswith(module.__name__)]
-    kinds = [kind for kind in own if issubclass(kind, base) and not inspect.isabstract(kind)]
+    public = [kind for kind in own if issubclass(kind, base) and not kind.__name__.startswith("_")]
+    kinds = [kind for kind in public if not inspect.isabstract(kind)]
     return {kind_in_words(kind, "_"): kind for kind in kinds}
 
 

@@ -306,7 +306,7 @@ def _pictures(judged: Mapping[str, Judged]) -> tuple[tuple[Picture, ...], ...]:
     codes = [
         (
             f"{name}\n{judged[name].errors['drawn']:.2f}, {judged[name].errors['view']:.2f}",
-            np.kron(judged[name].code, np.ones((8, 8))),
+            np.pad(np.kron(judged[name].code, np.ones((8, 8))), 2, constant_values=0.5),  # a white page
         )
         for name in names
     ]
