@@ -15,7 +15,7 @@ the same machine needs as much again for each."""
 CLOSE = 1.3
 """A finer image is made in any case if it takes up to this times the quickest, or this times its processor
 time."""
-BESIDES = 0.030
+BESIDES = 0.020
 """Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
 """Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""

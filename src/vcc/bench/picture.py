@@ -21,6 +21,7 @@ from vcc.optics.bands import trains_of
 from vcc.optics.train import Train
 from vcc.plan.choice import compile_best
 from vcc.plan.following import Parts
+from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import SharpenViews
 from vcc.plan.rays.bounds.windows import CellWindows
@@ -244,7 +245,9 @@ class _Making:
                 samples = coarser
             plan = _with_fewer_rays(plan, rays)
         self.planning += time.perf_counter() - began
-        found = drive(plan, samples, None, progress)
+        # The browser of this machine draws meanwhile: it gets a core.
+        how = How() if self.fineness == WHOLE else How(threads=max(How().workers - 1, 1))
+        found = drive(plan, samples, how, progress)
         self.runs.append(Run(train, samples, plan, found))
         return found
 
