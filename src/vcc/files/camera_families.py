@@ -34,7 +34,7 @@ from vcc.shapes.surface import Surface
 
 
 def _named(base: type, *modules: types.ModuleType) -> dict[str, Any]:
-    """Concrete public subclasses of ``base`` in the modules, by their names in a file: CosineSum is "cosine_sum"."""
+    """Public, concrete subclasses of ``base`` in modules, by their names in a file: CosineSum is "cosine_sum"."""
     things = [(thing, module) for module in modules for thing in vars(module).values() if inspect.isclass(thing)]
     own = [kind for kind, module in things if kind.__module__.startswith(module.__name__)]
     public = [kind for kind in own if issubclass(kind, base) and not kind.__name__.startswith("_")]

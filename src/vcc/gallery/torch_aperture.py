@@ -5,7 +5,8 @@ It needs PyTorch; `vcc.gallery.learned_aperture` loads it by name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,31 @@ def trained(
         The code, and a function from recorded patches (count, rows, columns), white 1, to log-probabilities of
         distances (count, distances).
     """
+    with _one_thread():
+        return _trained(spreads, start, crops, noise, share, steps, batch, seed)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Sums in the same order on all machines: the code is a matter of small differences."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _trained(
+    spreads: PointSpreads,
+    start: Array,
+    crops: Callable[[int], Array],
+    noise: tuple[float, float],
+    share: float | None,
+    steps: int,
+    batch: int,
+    seed: int,
+) -> tuple[Array, Callable[[Array], Array]]:
     generator = torch.Generator().manual_seed(seed)
     distances = len(spreads.modules)
     model = network(distances, generator)
