@@ -159,6 +159,8 @@ class Session:
             except Superseded:
                 continue
             except Exception as error:  # a bug: the client is notified, and the bench goes on
+                if not threading.main_thread().is_alive():
+                    return  # the program ends, and pools of threads with it
                 log.exception("a fault on the bench")
                 self._wanted = None
                 self._tell("failed", {"words": f"a bug in the program: {type(error).__name__}: {error}"})

@@ -128,3 +128,6 @@ def _opened(field: Field) -> None:
         field.whole()
     except InputError:
         return  # the client gets the message
+    except RuntimeError:  # else the program ends, and pools of threads with it
+        if threading.main_thread().is_alive():
+            raise
