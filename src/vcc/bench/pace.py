@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken
 
-IN_TIME = 0.015
+IN_TIME = 0.020
 """Time limit of an image during a drag, seconds: of those that take longer, a coarser one is made. The browser of
 the same machine needs as much again for each."""
 CLOSE = 1.3

@@ -73,6 +73,7 @@ class Session:
         self._changed = threading.Condition()
         self._closed = False
         self._wanted: Wanted | None = None
+        self._late = False
         self._turn = 0
         self._look = screen.PLAIN
         self._white = 1.0
@@ -252,7 +253,7 @@ class Session:
 
     def _do_set(self, message: Json) -> None:
         moving, rests = bool(message.get("moving", False)), bool(message.get("rests", False))
-        self._changed_by(message, self._editing.set(message), moving)
+        self._changed_by(message, self._editing.set(message), moving, late=moving and not rests)
         if moving and rests:  # a hand that holds still sees the whole image, until it moves on
             turn, shown = turn_of(message), self._imaging.is_shown()
             self._wanted = Wanted(turn, moving=not shown, coarse_shown=shown, rests=not shown)
@@ -299,9 +300,20 @@ class Session:
         self._editing.put(self.document.changed(["sensor", "z"], value))
         self._changed_by(message)
 
-    def _changed_by(self, message: Json, remark: str | None = None, moving: bool = False) -> None:
-        """Show the document, which a message has changed, and say what was done besides."""
-        self._tell_state(turn_of(message), moving)
+    def _changed_by(
+        self, message: Json, remark: str | None = None, moving: bool = False, late: bool = False
+    ) -> None:
+        """Show the document, which a message has changed, and say what was done besides.
+
+        Args:
+            message: that changed it.
+            remark: what was done besides.
+            moving: whether it belongs to a drag.
+            late: whether the state follows the image, which is awaited more: both are drawn in one frame.
+        """
+        self._late = late
+        if not late:
+            self._tell_state(turn_of(message), moving)
         self._wanted = Wanted(turn_of(message), moving)
         if remark is not None:
             self._remark(message["do"], remark, turn_of(message))
@@ -309,6 +321,12 @@ class Session:
     def _remark(self, doing: str, words: str, turn: int) -> None:
         """Say what was done besides."""
         self._tell("refused", {"do": doing, "words": words, "where": None, "turn": turn, "done": True})
+
+    def _tell_late(self, turn: int) -> None:
+        """Tell the state that was to follow the image."""
+        if self._late:
+            self._late = False
+            self._tell_state(turn, moving=True)
 
     def _tell_state(self, turn: int, moving: bool = False) -> None:
         document, history = self.document, self._editing.history
@@ -388,8 +406,10 @@ class Session:
             self._wanted = None
             self._imaging.none()
             self._tell("no picture", {"turn": wanted.turn, "words": str(_in_words(error))})
+            self._tell_late(wanted.turn)
             return
         self._tell_picture(taken, wanted)
+        self._tell_late(wanted.turn)
         self._wanted = wanted.then(taken.coarse)
         if not taken.coarse and not wanted.moving and not self._inbox.supersedes(False):
             self._tell("notes", {"turn": wanted.turn, "notes": self._imaging.notes(taken)})
