@@ -7,7 +7,7 @@ import pytest
 from scipy.special import j0, j1
 
 import vcc
-from tests.physics.test_diffraction import WINDOW, by_waves, camera_of
+from tests.physics.test_diffraction import by_waves, camera_of, in_pixels
 from vcc.analysis import mtf, psf
 from vcc.units import mm, nm, um
 
@@ -54,10 +54,7 @@ def test_out_of_focus_it_is_the_angular_spectrum(kind, waves):
     """The sensor beside the focus of a lens of f/16: as in tests/physics/test_diffraction.py."""
     near, pixel, size = 6.4 * mm, 5, 101
     distance = 1 / (1 / near - 8 * GREEN * waves / (0.4 * mm) ** 2)
-    whole = by_waves(kind, distance)
-    first = WINDOW // 2 - size * pixel // 2
-    truth = whole[first : first + size * pixel, first : first + size * pixel]
-    truth = truth.reshape(size, pixel, size, pixel).sum(axis=(1, 3))
+    truth = in_pixels(by_waves(kind, distance), pixel, size)
     small = camera_of(kind, distance, pixel * um)
     found = psf(small, math.inf, shape=(size, size), wavelength=GREEN)
     # The oracle's window and ours each fold in a part of what falls beyond.

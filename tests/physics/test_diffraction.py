@@ -126,6 +126,13 @@ def by_waves(kind, distance):
     return power / power.sum()
 
 
+def in_pixels(whole, pixel, size):
+    """The middle of an image by waves, in size×size pixels of so many points a side."""
+    first = WINDOW // 2 - size * pixel // 2
+    middle = whole[first : first + size * pixel, first : first + size * pixel]
+    return middle.reshape(size, pixel, size, pixel).sum(axis=(1, 3))
+
+
 def camera_of(kind, distance, pixel):
     return camera(*opening(kind)[1], d=distance, shape=(101, 101), pitch=pixel)
 
@@ -152,10 +159,7 @@ def test_out_of_focus_the_stated_errors_are_those_against_the_angular_spectrum(k
     distance = 1 / (1 / NEAR - 8 * GREEN * waves / SMALL**2)
     pixel, size = 5, 101
     small = camera_of(kind, distance, pixel * um)
-    whole = by_waves(kind, distance)
-    first = WINDOW // 2 - size * pixel // 2
-    truth = whole[first : first + size * pixel, first : first + size * pixel]
-    truth = truth.reshape(size, pixel, size, pixel).sum(axis=(1, 3))
+    truth = in_pixels(by_waves(kind, distance), pixel, size)
     made = StopDiffraction(small, (GREEN,), Pupil.of(small))
     frame = small.sensor.frame.inverse().linear
     found, both, rays = point_spreads(Pupil.of(small), 0.0, GREEN, frame, size)

@@ -12,9 +12,9 @@ from tests.physics.test_diffraction import (
     GREEN,
     NEAR,
     SMALL,
-    WINDOW,
     by_waves,
     camera_of,
+    in_pixels,
     star,
 )
 from vcc.sources import PlanesScene, TexturedPlane
@@ -35,10 +35,7 @@ def test_a_defocused_point_is_that_of_the_angular_spectrum(kind, waves, left, vi
     distance = 1 / (1 / NEAR - 8 * GREEN * waves / SMALL**2)
     pixel, size = 5, 101
     small = camera_of(kind, distance, pixel * um)
-    whole = by_waves(kind, distance)
-    first = WINDOW // 2 - size * pixel // 2
-    truth = whole[first : first + size * pixel, first : first + size * pixel]
-    truth = truth.reshape(size, pixel, size, pixel).sum(axis=(1, 3))
+    truth = in_pixels(by_waves(kind, distance), pixel, size)
     light = star(small, side=301, views=views, width=SMALL)
     errors = {}
     for how in (False, True, "depth"):

@@ -10,6 +10,7 @@ import pytest
 
 import vcc
 from tests.command_line import run as command
+from tests.zoo.few_views import few_views
 from vcc.zoo import Recorded, Report, run, scenes
 from vcc.zoo.bench import LEVELS, Kernels
 from vcc.zoo.entrants import FromFile, codes
@@ -30,12 +31,9 @@ SMALL = Design(light=20 / 49, cells=7, feature=2, steps=4, seeds=1, batch=1, sce
 @pytest.fixture(autouse=True, scope="module")
 def small_work():
     """Scenes of 9×9 views, and a checkpoint after every two steps."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(scenes, "VIEWS", 9)
+    with few_views() as patched:
         patched.setattr(torch_design, "KEEPING", 2)
-        scenes.scene.cache_clear()
         yield
-    scenes.scene.cache_clear()
 
 
 @pytest.fixture(scope="module")

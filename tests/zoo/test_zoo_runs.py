@@ -11,6 +11,7 @@ import zarr
 
 import vcc
 from tests.command_line import run as command
+from tests.zoo.few_views import few_views
 from vcc.zoo import Report, run, running, scenes
 from vcc.zoo.entrants import codes, open_square
 
@@ -21,13 +22,9 @@ HALF = "def half(recorded):\n    return recorded.values * 0 + 0.5\n"
 
 
 @pytest.fixture(autouse=True, scope="module")
-def few_views():
-    """Scenes of 9×9 views: what runs keep and compare is the same, in an eighth of the time."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(scenes, "VIEWS", 9)
-        scenes.scene.cache_clear()
+def small_scenes():
+    with few_views():
         yield
-    scenes.scene.cache_clear()
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ It needs PyTorch; `vcc.gallery.learned_aperture` loads it by name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +21,7 @@ with checks.package("the learned aperture", "torch", "torch"):
 from vcc.camera import Camera
 from vcc.learn.torch_constraints import binary, raw_of, sigmoid_mask, total_light
 from vcc.learn.torch_module import CameraModule
+from vcc.learn.torch_threads import one_thread
 from vcc.light_field import LightField
 
 Array = NDArray[Any]
@@ -87,6 +87,7 @@ def normalised(patches: torch.Tensor) -> torch.Tensor:
     return (patches - mean) / mean.clamp(min=1e-3) * 4
 
 
+@one_thread()  # the code is a matter of small differences
 def trained(
     spreads: PointSpreads,
     start: Array,
@@ -113,31 +114,6 @@ def trained(
         The code, and a function from recorded patches (count, rows, columns), white 1, to log-probabilities of
         distances (count, distances).
     """
-    with _one_thread():
-        return _trained(spreads, start, crops, noise, share, steps, batch, seed)
-
-
-@contextmanager
-def _one_thread() -> Iterator[None]:
-    """Sums in the same order on all machines: the code is a matter of small differences."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-def _trained(
-    spreads: PointSpreads,
-    start: Array,
-    crops: Callable[[int], Array],
-    noise: tuple[float, float],
-    share: float | None,
-    steps: int,
-    batch: int,
-    seed: int,
-) -> tuple[Array, Callable[[Array], Array]]:
     generator = torch.Generator().manual_seed(seed)
     distances = len(spreads.modules)
     model = network(distances, generator)

@@ -266,9 +266,9 @@ class Chain:
         """Raise an error for parameters that move the edges of an aperture whose diffraction is computed."""
         if not self.how.diffraction:
             return
-        kernels = {name for name in self._at({}).numbers if name.endswith(".kernel")}
+        made = self._at({})
+        kernels = {name for name in made.numbers if name.endswith(".kernel")}
         for name in self.names:
-            made = self._at({})
             if any(kernels & set(linear.numbers(made.plan)) for linear in made.linear(name)):
                 continue
             here, step = read(self.train, name), APERTURE * scale(self.train, name)

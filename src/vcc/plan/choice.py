@@ -15,7 +15,7 @@ from vcc.optics.bands import refuse
 from vcc.optics.train import Train
 from vcc.plan.coverage import AskedLight, Missing
 from vcc.plan.depth_rule import ViewsBetween, denser
-from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, plan_again
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, alike, check_unchanged, choice, plan_again
 from vcc.plan.footprints.codes import Codes
 from vcc.plan.footprints.compile import ByFootprints, FootprintChoices, blurs_or_why_not
 from vcc.plan.footprints.diffusers import Blurs, choose_kernels
@@ -245,12 +245,7 @@ class _Making:
             light = AskedLight.of(self.train, self.grid)
             return light.missing, light.words
 
-        return self.parts.decision("missing", self._alike, asked)
-
-    @property
-    def _alike(self) -> object:
-        """What cameras have in common that share decisions."""
-        return self.grid.shape, self.train.sensor.shape, self.elements, self.how
+        return self.parts.decision("missing", alike(self.train, self.grid, self.how), asked)
 
     @property
     @cached

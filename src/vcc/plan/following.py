@@ -17,6 +17,9 @@ from typing import Any, TypeVar
 from vcc.base.cached import preset
 from vcc.base.errors import InputError
 from vcc.base.values import content
+from vcc.fields.grid import Grid
+from vcc.optics.train import Train
+from vcc.plan.how import How
 
 Made = TypeVar("Made")
 Record = TypeVar("Record")
@@ -149,6 +152,11 @@ class Draft:
 
     lasting: int
     error: float
+
+
+def alike(train: Train, grid: Grid, how: How) -> tuple[object, ...]:
+    """What cameras have in common that share the decisions of drafts."""
+    return grid.shape, train.sensor.shape, [element.kind for element in train.elements], how
 
 
 class Parts:

@@ -214,8 +214,13 @@ def exposed(
     made = expose_image(image, sensor, exposure_time(electrons, reference), seed=seed, threads=1)
     charge = np.asarray(made.electrons(), np.float64)
     white = electrons * light
-    noise = math.sqrt(max(float(charge.mean()), 0.0) + ELECTRONICS.read_noise**2 + 1 / 12) / white
+    noise = math.sqrt(noise_variance(max(float(charge.mean()), 0.0))) / white
     return np.ascontiguousarray(charge[::-1, ::-1] / white), noise
+
+
+def noise_variance(electrons: Any) -> Any:
+    """Of a pixel with so many electrons on average, electrons²: photons, reading, and rounding to numbers."""
+    return electrons + ELECTRONICS.read_noise**2 + 1 / 12
 
 
 def inner(picture: NDArray[np.floating]) -> Array:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +24,7 @@ from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, reading
 from vcc.base.values import fingerprint
 from vcc.camera import Camera
+from vcc.learn.torch_threads import one_thread
 from vcc.zoo.bench import BORDER
 from vcc.zoo.decoders import Recorded
 
@@ -89,17 +88,6 @@ class Network(torch.nn.Module):  # type: ignore[misc]
         filters = transfer.conj() / (transfer.abs().square() + ratio)
         found = torch.fft.irfft2(filters * torch.fft.rfft2(wide)[:, None], s=(rows, columns))
         return found[..., BORDER:-BORDER, BORDER:-BORDER] + mean[:, None]
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """PyTorch in one thread: sums are then the same each time."""
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 @dataclass(frozen=True)

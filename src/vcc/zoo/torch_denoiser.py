@@ -28,6 +28,7 @@ with checks.package("plug-and-play", "deepinv", "deepinv"):
             "the decoders out: --without plug-and-play --without denoised"
         ) from error
 
+from vcc.learn.torch_threads import one_thread
 from vcc.recover.blur import Blur
 
 Array = NDArray[np.float64]
@@ -82,16 +83,11 @@ def _quietly(function: Any, values: Array, noise: float) -> Array:
     More noise than the network has learned is scaled to the most that it has, together with the picture, about its
     mean and to the middle of the range.
     """
-    threads, scale = torch.get_num_threads(), min(1.0, MOST_NOISE / noise)
-    mean = float(values.mean())
+    scale, mean = min(1.0, MOST_NOISE / noise), float(values.mean())
     middle = mean if scale == 1 else 0.5
-    torch.set_num_threads(1)
-    try:
-        with torch.no_grad():
-            given = middle + scale * np.ascontiguousarray(values - mean, np.float32)
-            found = function(torch.from_numpy(given.astype(np.float32))[None, None], scale * noise)[0, 0].numpy()
-    finally:
-        torch.set_num_threads(threads)
+    with one_thread(), torch.no_grad():
+        given = middle + scale * np.ascontiguousarray(values - mean, np.float32)
+        found = function(torch.from_numpy(given.astype(np.float32))[None, None], scale * noise)[0, 0].numpy()
     return mean + (np.asarray(found, np.float64) - middle) / scale
 
 

@@ -33,9 +33,10 @@ from vcc.files.camera_writing import tables_of_train
 from vcc.files.writer_lock import WriterLock
 from vcc.learn.fabrication import MIRRORS
 from vcc.learn.torch_constraints import fabricable
+from vcc.learn.torch_threads import one_thread
 from vcc.zoo.bench import BORDER, LEVELS
 from vcc.zoo.report import Score
-from vcc.zoo.torch_decoder import Network, one_thread
+from vcc.zoo.torch_decoder import Network
 from vcc.zoo.torch_parts import Design, Parts, read, write
 
 ARMS = ("learned", "random", "round", "open")

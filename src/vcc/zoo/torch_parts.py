@@ -31,7 +31,18 @@ from vcc.learn.torch_electronics import expose
 from vcc.learn.torch_module import CameraModule
 from vcc.optics.mask import Mask
 from vcc.plot.tracing import trace
-from vcc.zoo.bench import ELECTRONICS, FOCUS, RAYS, SIDE, Kernels, distance_of, exposure_time, of_lens, sensor
+from vcc.zoo.bench import (
+    ELECTRONICS,
+    FOCUS,
+    RAYS,
+    SIDE,
+    Kernels,
+    distance_of,
+    exposure_time,
+    noise_variance,
+    of_lens,
+    sensor,
+)
 from vcc.zoo.entrants import open_square, round_stop
 from vcc.zoo.scenes import identity, scene
 from vcc.zoo.task import Task
@@ -189,7 +200,7 @@ class Parts(Brief):
         charge = (numbers - ELECTRONICS.black_level) / ELECTRONICS.gain
         white = levels * light
         mean = charge.mean((-2, -1)).clamp(min=0)
-        noise = torch.sqrt(mean + ELECTRONICS.read_noise**2 + 1 / 12) / white
+        noise = torch.sqrt(noise_variance(mean)) / white
         kernels = torch.einsum("p,pdyx->dyx", parts, self.kernels) / light
         return charge / white[:, None, None], kernels, noise
 

@@ -40,6 +40,7 @@ from vcc.zoo.bench import (
     check_area,
     distance_of,
     image_distance,
+    inner,
     of_lens,
 )
 from vcc.zoo.decoders import Decoder, Recorded, as_recorded, by_defocus, denoised
@@ -333,7 +334,7 @@ def focused(scene: Scene) -> Array:
 
 def _scores(decoded: Array, truth: Array, ends: tuple[tuple[int, ...], tuple[int, ...]]) -> tuple[float, ...]:
     """PSNR over all pictures; of two of them; the mean of SSIM."""
-    apart = (decoded - truth)[..., BORDER:-BORDER, BORDER:-BORDER] ** 2
+    apart = inner(decoded - truth) ** 2
     pairs = zip(decoded.reshape(-1, *SHAPE), truth.reshape(-1, *SHAPE), strict=True)
     similar = float(np.mean([picture_scores(*pair)[1] for pair in pairs]))
     first, second = (decibels(float(apart[end].mean())) for end in ends)

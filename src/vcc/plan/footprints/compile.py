@@ -17,7 +17,7 @@ from vcc.base.cached import cached
 from vcc.base.describe import Brief
 from vcc.fields.grid import Grid
 from vcc.optics.train import Train
-from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, choice, gathered, give
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, alike, choice, gathered, give
 from vcc.plan.footprints import against_sensor
 from vcc.plan.footprints.absorbing import Absorbing, AbsorbingChoices, choose_absorbing, choose_at_views
 from vcc.plan.footprints.against_sensor import MeansOnSensor, choose_means
@@ -315,8 +315,7 @@ class ByFootprints:
     def _alike(self) -> object:
         """What cameras have in common that share decisions."""
         absorbing = self.absorbing
-        kinds = [element.kind for element in self.train.elements]
-        return self.grid.shape, self.sensor.shape, kinds, len(absorbing.at_views), len(absorbing.in_path), self.how
+        return alike(self.train, self.grid, self.how), len(absorbing.at_views), len(absorbing.in_path)
 
     @property
     @cached

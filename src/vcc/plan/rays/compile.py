@@ -25,7 +25,7 @@ from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.terms import RayTransmission
 from vcc.optics.train import Stage, Train
 from vcc.optics.visible_pupil import VisiblePupil
-from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, check_unchanged, choice, gathered, give
+from vcc.plan.following import NONE_KEPT, Follow, Linear, Parts, alike, check_unchanged, choice, gathered, give
 from vcc.plan.how import How
 from vcc.plan.model import Plan
 from vcc.plan.operators import Before, DarkBorder, SharpenViews
@@ -174,9 +174,8 @@ class ByRays:
         """The smallest aim; drafts share whether it is at everything that the light field contains."""
         if self.parts.draft is None:
             return found(self.path)
-        kinds = [element.kind for element in self.train.elements]
-        alike = kinds, self.grid.shape, self.how
-        return settled(self.path, self.parts.decision("aim", alike, lambda: found(self.path).everything))
+        shared = alike(self.train, self.grid, self.how)
+        return settled(self.path, self.parts.decision("aim", shared, lambda: found(self.path).everything))
 
     @property
     @cached
