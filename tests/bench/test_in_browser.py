@@ -113,7 +113,7 @@ def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page
         ("ArrowLeft", "52.99 mm"),
     ):
         page.page.keyboard.press(key)
-        assert page.place("sensor") == place
+        page.reaches("sensor", place)
     page.page.wait_for_timeout(700)  # longer than the pause that ends a movement
     page.part("sensor").evaluate(
         "part => { for (let n = 0; n < 3; n++)"

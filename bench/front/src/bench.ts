@@ -25,6 +25,8 @@ export interface Answered<What extends Answer["what"] = Answer["what"]> {
 const PATIENCE = 150;
 /** After so long without a new value a hand that drags holds still, milliseconds. */
 const REST = 40;
+/** In a drag the views wait for the next picture at most so long, milliseconds. */
+const TOGETHER = 50;
 const REMARK = 12_000;
 const ADDRESS_AFTER = 250;
 const LONGEST_ADDRESS = 200_000;
@@ -80,6 +82,10 @@ export class Bench extends EventTarget {
   /** Of what was asked last that shows another picture. */
   turn = 0;
 
+  /** In a drag, until the next picture and its state have come: all views are drawn in one frame with them. */
+  together: Promise<void> | null = null;
+
+  private release: () => void = () => {};
   private silent = false;
   /** What is selected once the host has answered this turn: an element that it adds. */
   private selectAt = Infinity;
@@ -125,6 +131,7 @@ export class Bench extends EventTarget {
     if (this.document) this.document = patched(this.document, where, value);
     window.clearTimeout(this.restTimer);
     if (moving) {
+      if (this.open && this.turn > this.heard) this.wait();
       this.next = { where, value };
       if (this.turn - this.heard < this.host.ahead) this.sendNext();
       this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
@@ -134,6 +141,19 @@ export class Bench extends EventTarget {
       this.ask({ do: "set", where, value, moving: false });
     }
     this.changed();
+  }
+
+  /** Let the views wait for the picture that is under way. */
+  private wait(): void {
+    this.together ??= new Promise((resolve) => {
+      const timer = window.setTimeout(() => this.release(), TOGETHER);
+      this.release = () => {
+        window.clearTimeout(timer);
+        this.together = null;
+        this.release = () => {};
+        resolve();
+      };
+    });
   }
 
   /** A hand that holds still sees the whole picture. */
@@ -332,6 +352,7 @@ export class Bench extends EventTarget {
         this.progress = message.done < message.total ? message : null;
         break;
     }
+    if (message.is !== "picture" || !message.moving) this.release(); // in a drag the state follows
     this.changed();
   }
 
@@ -447,6 +468,7 @@ export class Bench extends EventTarget {
   private settle(): void {
     window.clearTimeout(this.timer);
     this.heard = this.turn;
+    this.release();
   }
 
   private ask(message: object, buffers?: ArrayBuffer[]): void {
@@ -508,8 +530,13 @@ function dataAddress(view: DataView): string {
   return `data:image/${bytes[0] === 0xff ? "jpeg" : "webp"};base64,${btoa(letters)}`;
 }
 
-function decoded(view: DataView): Promise<ImageBitmap> {
-  return createImageBitmap(new Blob([bytesOf(view)], { type: "image/jpeg" }));
+/** By an image of a data address: a Blob is registered in the browser's own process, for which the page waits. */
+async function decoded(view: DataView): Promise<ImageBitmap> {
+  const image = new Image();
+  const loaded = new Promise((resolve, reject) => [image.onload, image.onerror] = [resolve, reject]);
+  image.src = dataAddress(view);
+  await loaded;
+  return createImageBitmap(image);
 }
 
 function saved(name: string, type: string, view: DataView): void {

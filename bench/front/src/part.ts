@@ -20,6 +20,11 @@ export class Part extends LitElement {
     return null;
   }
 
+  protected override scheduleUpdate(): void | Promise<unknown> {
+    const { together } = this.bench;
+    return together ? together.then(() => super.scheduleUpdate()) : super.scheduleUpdate();
+  }
+
   override connectedCallback(): void {
     super.connectedCallback();
     this.bench.addEventListener("change", this.follow);

@@ -216,6 +216,11 @@ export class SideView extends Part {
     this.pointers.set(event.pointerId, point);
   }
 
+  /** Places of the hand that come before the browser's next frame, where it tells them: an image is asked for at once. */
+  private moveRaw(event: PointerEvent): void {
+    if ((this.drag || this.held) && this.pointers.size === 1) this.move(event);
+  }
+
   private moveHandle(held: Held, point: { x: number; y: number }): void {
     if (!held.moved && Math.hypot(point.x - held.x, point.y - held.y) < 2) return;
     const { value, words } = valueAt(held, point.x, point.y, this.mapping());
@@ -341,7 +346,7 @@ export class SideView extends Part {
     return html`
       <svg width=${this.width} height=${this.height} class="${cursor} ${this.bench.open ? "" : "stale"}" role="group" aria-label="The camera from the side"
         style="touch-action:${this.width > ALL_RAYS || this.frame.zoom > 1 ? "none" : "pan-y"}"
-        @pointerdown=${this.down} @pointermove=${this.move} @pointerup=${this.lift} @pointercancel=${this.lift}
+        @pointerdown=${this.down} @pointermove=${this.move} @pointerrawupdate=${this.moveRaw} @pointerup=${this.lift} @pointercancel=${this.lift}
         @pointerleave=${() => (this.hover = null)} @keydown=${this.keyOfDrawing}
         @dblclick=${(event: MouseEvent) => this.hover === null && (this.frame.zoom > 1 ? this.fit() : this.zoom(6, ...this.at(event)))}>
         <clipPath id="stage"><rect x="0" y=${scale.top - 8} width=${this.width} height=${scale.bottom - scale.top + 24}></rect></clipPath>

@@ -12,18 +12,12 @@ import numpy as np
 
 Result = TypeVar("Result")
 
-_this_thread = threading.local()
-
-
-def _begin() -> None:
-    _this_thread.works = True
-
 
 class Workers(ThreadPoolExecutor):
     """A pool of threads. An error ends the work: tasks that have not started are cancelled.
 
-    A pool of one thread, created by a thread of another pool, runs in that thread: handing work over and waiting
-    for it would cost two switches of the GIL.
+    A pool of one thread runs in the thread that creates it, unless that is Python's main thread, which handles
+    Ctrl-C: handing work over and waiting for it would cost two switches of the GIL.
 
     After Ctrl-C the pool does not wait for running tasks, which are short, or cannot be interrupted because they
     are compiled.
@@ -34,9 +28,9 @@ class Workers(ThreadPoolExecutor):
     """
 
     def __init__(self, threads: int) -> None:
-        super().__init__(threads, initializer=_begin)
+        super().__init__(threads)
         self.threads, self.ended = threads, np.zeros(1, dtype=np.bool_)
-        self._is_this_thread = threads == 1 and getattr(_this_thread, "works", False)
+        self._is_this_thread = threads == 1 and threading.current_thread() is not threading.main_thread()
 
     def submit(self, function: Callable[..., Any], /, *args: Any, **options: Any) -> Future[Any]:
         """See `concurrent.futures.Executor.submit`."""

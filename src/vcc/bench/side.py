@@ -44,7 +44,7 @@ from vcc.plot.fans import (
     half_height,
     points_to_show,
     scene_length,
-    trace_point,
+    trace_points,
 )
 from vcc.plot.labels import label_of
 from vcc.plot.tracing import Paths, crossings, openings, spread_along
@@ -98,18 +98,16 @@ def side(
         start = min(start, 1.1 * aperture["z"])
     scattering = any(stage.faces.spread is not None for stage in train.stages)
     rays = RAYS_THAT_SPLIT if scattering else RAYS
-    paths = [
-        trace_point(train, point, light_field, axis, OFF_AXIS_RAYS if point.offset else rays, start, True)
-        for point in points
-    ]
+    fans = [(point, OFF_AXIS_RAYS if point.offset else rays) for point in points]
+    paths = trace_points(train, fans, light_field, axis, start, within_rim=True)
     half = half_height(train, paths, axis)
     span = Span(axis, -half, half)
     focus = focused_distance(train)
     scene = {} if grid is None else {f"{name} of the scene": z for name, z in scene_distances(grid).items()}
     places = without_repeats(scene | ({} if focus is None else {"what is sharp now": focus}))
     pulled = [[] for _ in elements] if moving else snaps_of_elements(elements, train, places)
-    fans = [_rays(point, path, axis) for point, path in zip(points, paths, strict=True)]
-    meeting = [fan["meet"][0] for fan in fans if fan["meet"] is not None]
+    drawn = [_rays(point, path, axis) for point, path in zip(points, paths, strict=True)]
+    meeting = [fan["meet"][0] for fan in drawn if fan["meet"] is not None]
     return {
         "axis": "x" if axis == 0 else "y",
         "start": _short(start),
@@ -126,7 +124,7 @@ def side(
             "label": _sensor_label(train, axis),
             "handles": handles_of_sensor(train.sensor, axis),
         },
-        "rays": sorted(fans, key=lambda fan: _ORDER.index(fan["role"])),
+        "rays": sorted(drawn, key=lambda fan: _ORDER.index(fan["role"])),
         "aperture": aperture,
         "snaps": [] if moving else snaps_of_sensor(train, scene),
         "words": _words(train, focus, grid, axis),
@@ -276,9 +274,9 @@ def _meeting(paths: Paths, axis: int) -> tuple[float, float] | None:
     arrived = paths.shares[:, -1] > 0
     if len(paths.z) < 2 or paths.starts.any() or arrived.sum() < 2:
         return None
-    from_z, to_z = paths.z[-2:]
+    from_z, to_z = paths.depths[arrived, -2], paths.z[-1]
     before, after = (paths.positions[arrived, plane, axis] for plane in (-2, -1))
-    if not to_z > from_z:
+    if not (to_z > from_z).all():
         return None
     slopes = (after - before) / (to_z - from_z)
     spread = slopes - slopes.mean()
@@ -288,7 +286,7 @@ def _meeting(paths: Paths, axis: int) -> tuple[float, float] | None:
     left = after + beyond * slopes
     z = to_z + beyond
     unsharp = np.ptp(left) > SHARP * max(np.ptp(after), np.ptp(before))
-    if unsharp or not from_z < z < (1 + FARTHEST_IMAGE) * to_z:
+    if unsharp or not paths.z[-2] < z < (1 + FARTHEST_IMAGE) * to_z:
         return None
     return _short(z), _short(float(left.mean()))
 

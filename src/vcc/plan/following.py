@@ -146,7 +146,7 @@ class Draft:
     """Request for plans that are made quickly, one after the other, for images that are seen for a moment.
 
     Args:
-        lasting: plans for which a decision about accuracy lasts.
+        lasting: plans for which a decision about accuracy lasts, or a few more: a plan renews one at most.
         error: share of the light from which on cells of views and samples are divided.
     """
 
@@ -172,8 +172,8 @@ class Parts:
 
     def __init__(self, check: Callable[[], None] | None = None, draft: Draft | None = None) -> None:
         self._check, self.draft = check, draft
-        self._decided: dict[Hashable, Any] = {}
-        self._plans = 0
+        self._decided: dict[Hashable, tuple[int, Any]] = {}
+        self._plans, self._renewed = 0, False
         self._kept: dict[Hashable, Any] = {}
         self._used: dict[Hashable, Any] | None = None
 
@@ -213,18 +213,21 @@ class Parts:
         if self.draft is None:
             return make()
         key = what, content(of)
-        if key not in self._decided:
-            self._decided[key] = make()
-        found: Made = self._decided[key]
+        old = key in self._decided and self._plans - self._decided[key][0] >= self.draft.lasting
+        if key not in self._decided or (old and not self._renewed):
+            self._renewed |= old
+            self._decided[key] = self._plans, make()
+        found: Made = self._decided[key][1]
         return found
 
     @contextmanager
     def keeping(self) -> Iterator[None]:
         """Keep the parts of the plan that is made within the context, and only these."""
         self._used = {}
-        if self.draft is not None and self._plans % self.draft.lasting == 0:
-            self._decided.clear()
-        self._plans += 1
+        if self.draft is not None:
+            latest = self._plans - 2 * self.draft.lasting
+            self._decided = {key: each for key, each in self._decided.items() if each[0] > latest}
+        self._plans, self._renewed = self._plans + 1, False
         try:
             yield
         finally:

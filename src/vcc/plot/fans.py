@@ -157,32 +157,43 @@ def scene_length(camera: Train, points: Sequence[Point]) -> float:
 
 
 def trace_point(
+    camera: Train, point: Point, light_field: InMemory | None, axis: int, rays: int, start: float
+) -> Paths:
+    """The fan of one point; see `trace_points`."""
+    return trace_points(camera, [(point, rays)], light_field, axis, start)[0]
+
+
+def trace_points(
     camera: Train,
-    point: Point,
+    fans: Sequence[tuple[Point, int]],
     light_field: InMemory | None,
     axis: int,
-    rays: int,
     start: float,
     within_rim: bool = False,
-) -> Paths:
-    """The fan from a point; it starts at the point itself if that is in the drawing.
+) -> list[Paths]:
+    """The fans from points; each starts at the point itself if that is in the drawing.
 
     Args:
         camera: for the rays.
-        point: of the scene.
-        light_field: the fan fills its width on the entrance plane; None fills the first lens with a rim.
+        fans: points of the scene, and the number of rays of each.
+        light_field: fans fill its width on the entrance plane; None fills the first lens with a rim.
         axis: 0 for x, 1 for y.
-        rays: number of rays.
         start: of the drawing, metres, 0 or less.
         within_rim: whether a fan that fills the light field is limited to what the first lens with a rim passes.
     """
-    low, high = _entrance(camera, point, light_field, axis)
-    if within_rim and light_field is not None and any(True for _ in openings(camera, axis)):
-        least, most = _entrance(camera, point, None, axis)
-        if max(low, least) < min(high, most):
-            low, high = max(low, least), min(high, most)
-    bundle = fan(np.linspace(low, high, rays), point.distance, point.offset, axis)
-    return trace(camera, bundle, max(start, -point.distance), split_along=axis)
+    rim = within_rim and light_field is not None and any(True for _ in openings(camera, axis))
+    bundles, starts = [], []
+    for point, rays in fans:
+        low, high = _entrance(camera, point, light_field, axis)
+        if rim:
+            least, most = _entrance(camera, point, None, axis)
+            if max(low, least) < min(high, most):
+                low, high = max(low, least), min(high, most)
+        bundles.append(fan(np.linspace(low, high, rays), point.distance, point.offset, axis))
+        starts.append(np.full(rays, max(start, -point.distance)))
+    traced = trace(camera, np.concatenate(bundles), np.concatenate(starts), split_along=axis)
+    ends = np.cumsum([rays for _, rays in fans])
+    return [traced.coming_from(range(end - rays, end)) for end, (_, rays) in zip(ends, fans, strict=True)]
 
 
 def _entrance(camera: Train, point: Point, light_field: InMemory | None, axis: int) -> tuple[float, float]:

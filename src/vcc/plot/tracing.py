@@ -37,7 +37,9 @@ class Paths(Brief):
         shares: remaining light of each ray on arrival at each plane, 0 to 1: (rays, planes).
         starts: the plane at which each ray begins, (rays,): 0, or that of the diffuser at which it branched off.
             Before that, it coincides with the ray from which it branched off.
-        behind: how far behind each plane's z a ray meets a curved surface of a real lens, metres: (rays, planes).
+        behind: how far behind each plane's z a ray meets a curved surface of a real lens, or begins, metres:
+            (rays, planes).
+        origins: the number of the given ray from which each one comes, (rays,).
     """
 
     z: Array
@@ -45,6 +47,13 @@ class Paths(Brief):
     shares: Array
     starts: NDArray[np.int64]
     behind: Array
+    origins: NDArray[np.int64]
+
+    def coming_from(self, given: range) -> Paths:
+        """Those of some of the given rays."""
+        some = (self.origins >= given.start) & (self.origins < given.stop)
+        several = self.positions, self.shares, self.starts, self.behind, self.origins
+        return Paths(self.z, *(each[some] for each in several))
 
     @property
     def depths(self) -> Array:
@@ -94,13 +103,13 @@ def crossings(element: Element, parts: Sequence[Part] | None = None) -> list[Cro
     return found
 
 
-def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int | None = None) -> Paths:
+def trace(camera: Train, rays: ArrayLike, start: ArrayLike = 0.0, split_along: int | None = None) -> Paths:
     """Trace rays from a plane before the camera through its elements to the sensor.
 
     Args:
         camera: with elements that bend, absorb and scatter.
         rays: (u, v, s, t) of each ray at the entrance plane z = 0: (rays, 4), metres and slopes.
-        start: start of the drawing, metres, 0 or less.
+        start: where the drawing of the rays begins, metres, 0 or less: of all, or of each (rays,).
         split_along: the axis, 0 for x and 1 for y, along which scattered rays split into three (`BRANCHES`);
             None ignores scattering.
 
@@ -108,8 +117,11 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
         InputError: an element with an invalid result.
     """
     given = np.asarray(rays, dtype=np.float64)
-    bundle = _Bundle(given, np.ones(len(given)), np.zeros(len(given), dtype=np.int64), [], [], [], [])
-    bundle.cross(start, Affine.propagation(start)(given)[:, :2])
+    count = len(given)
+    bundle = _Bundle(given, np.ones(count), np.zeros(count, dtype=np.int64), np.arange(count), [], [], [], [])
+    starts = np.broadcast_to(np.asarray(start, dtype=np.float64), (count,))
+    first = float(starts.min(initial=0.0))
+    bundle.cross(first, given[:, :2] + starts[:, None] * given[:, 2:], starts - first)
     here = 0.0
     for element, parts in camera.met:
         bundle.rays = Affine.propagation(element.z - here)(bundle.rays)
@@ -129,6 +141,7 @@ def trace(camera: Train, rays: ArrayLike, start: float = 0.0, split_along: int |
         np.stack(bundle.shares, axis=1),
         bundle.starts,
         np.stack(bundle.behind, axis=1),
+        bundle.origins,
     )
 
 
@@ -139,6 +152,7 @@ class _Bundle:
     rays: Array
     share: Array
     starts: NDArray[np.int64]
+    origins: NDArray[np.int64]
     z: list[float]
     positions: list[Array]
     shares: list[Array]
@@ -199,7 +213,7 @@ class _Bundle:
             self.rays[:, 2 + axis] += slopes[np.arange(count), np.arange(count) % branch]
             return
         parent = np.repeat(np.arange(count), branch)
-        self.rays, self.share = self.rays[parent], self.share[parent] / branch
+        self.rays, self.share, self.origins = self.rays[parent], self.share[parent] / branch, self.origins[parent]
         self.rays[:, 2 + axis] += slopes.ravel()
         self.positions = [positions[parent] for positions in self.positions]
         self.shares = [shares[parent] for shares in self.shares]
