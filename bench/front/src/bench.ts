@@ -24,7 +24,7 @@ export interface Answered<What extends Answer["what"] = Answer["what"]> {
 /** After so long the newest value is sent although no state of those before has come, milliseconds. */
 const PATIENCE = 150;
 /** After so long without a new value a hand that drags holds still, milliseconds. */
-const REST = 40;
+const REST = 30;
 /** In a drag the views wait for the next picture at most so long, milliseconds. */
 const TOGETHER = 50;
 const REMARK = 12_000;

@@ -23,7 +23,7 @@ LEFT = 0.4
 """Seconds after which a fineness that was too slow is tried again, if it was fast enough once."""
 TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
-WORTH = 1.1
+WORTH = 1.5
 """A fineness is tried again if its shortest time, by how busy the machine is, is at most this times the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
