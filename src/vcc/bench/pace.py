@@ -24,7 +24,8 @@ LEFT = 0.4
 TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
 WORTH = 1.5
-"""A fineness is tried again if its shortest time, by how busy the machine is, is at most this times the limit."""
+"""A coarse image is tried again if its shortest time, by how busy the machine is, is at most this times the limit; a
+whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
 MOST_KINDS = 50
@@ -55,8 +56,8 @@ class Pace:
 
     The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the
     clock or by the processor time that it costs with everything around it. For a
-    fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
-    scaled by the work. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
+    coarse fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
+    scaled by the work; a whole image must have been measured. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
     busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
     were measured meanwhile are forgotten.
 
@@ -105,14 +106,15 @@ class Pace:
             del self._kept[next(iter(self._kept))]
 
     def seconds(self, of: Hashable) -> float | None:
-        """Expected time of a whole image, seconds; None without measurements."""
-        return self._expected(of, WHOLE) if of in self._kept else None
+        """Expected time of a whole image, seconds; None without measurements of one."""
+        return self._kept[of][1][WHOLE].recent if of in self._kept and WHOLE in self._kept[of][1] else None
 
     def fineness(self, of: Hashable) -> Fineness:
         """The fineness of the next image; without measurements, the finest coarse one."""
         if of not in self._kept:
             return COARSER[0]
-        expected = {each: self._expected(of, each) for each in (WHOLE, *COARSER)}
+        whole = self.seconds(of)
+        expected = ({} if whole is None else {WHOLE: whole}) | {each: self._expected(of, each) for each in COARSER}
         limit = max(IN_TIME, CLOSE * min(expected.values()))
         work = {each: BESIDES + times.work for each, times in self._kept[of][1].items()}
         close = CLOSE * work.get(min(expected, key=expected.__getitem__), 0.0)
@@ -127,7 +129,8 @@ class Pace:
         every = self._kept[of][1]
         times = every.get(fineness)
         newest = max(every.values(), key=lambda each: each.at)
-        if times is None or times.least * newest.recent / newest.least > WORTH * limit:
+        most = limit if fineness == WHOLE else WORTH * limit
+        if times is None or times.least * newest.recent / newest.least > most:
             return False
         return self._clock() - times.at >= max(LEFT, (times.recent - limit) / TRIALS)
 
