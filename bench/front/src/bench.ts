@@ -82,7 +82,7 @@ export class Bench extends EventTarget {
   /** Of what was asked last that shows another picture. */
   turn = 0;
 
-  /** In a drag, until the next picture and its state have come: all views are drawn in one frame with them. */
+  /** In a drag, until the next picture has come: all views are drawn in one frame with it. */
   together: Promise<void> | null = null;
 
   private release: () => void = () => {};
@@ -352,7 +352,9 @@ export class Bench extends EventTarget {
         this.progress = message.done < message.total ? message : null;
         break;
     }
-    if (message.is !== "picture" || !message.moving) this.release(); // in a drag the state follows
+    // In a drag a picture's state follows it, and is drawn with the next one.
+    if (message.is === "state" && message.document === null) this.wait();
+    else this.release();
     this.changed();
   }
 
