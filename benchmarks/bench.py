@@ -8,14 +8,15 @@
 ``vcc bench`` runs in a process of its own, as users start it, and headless Chromium drags parts with its mouse, to
 60 places a second, with snapping. Times are taken in the page: from when the browser had the input until the
 first task after the frame in which the canvas was drawn with a picture of that place or a later one. Nothing is
-warmed up but the picture that the page shows when it opens. The mouse is moved through the browser's debugging port,
-without waiting for the page, as a hand does: Playwright's own moves take 4 ms of a core each, and wait.
+warmed up but the picture that the page shows when it opens. The mouse is moved through the browser's debugging
+port, without waiting for the page, as a hand does: Playwright's own moves take 4 ms of a core each, and wait.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import itertools
 import json
 import math
 import os
@@ -243,31 +244,29 @@ def host_alone(case: Case, files: tuple[Path, Path], field: Field) -> str:
 # --- in a browser ---
 
 
-class Hand:
-    """Moves Chromium's mouse, and does not wait for the page.
+@contextlib.contextmanager
+def hand(port: int, page: Any) -> Iterator[Callable[[float, float], None]]:
+    """Moves Chromium's mouse, with its left button pressed, and does not wait for the page.
 
     Args:
         port: of Chromium's debugging.
         page: on which the mouse is.
     """
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list") as listed:
+        targets = json.load(listed)
+    address = next(each["webSocketDebuggerUrl"] for each in targets if each["url"] == page.url)
+    numbers = itertools.count()
+    with connect(address) as chromium:
 
-    def __init__(self, port: int, page: Any) -> None:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list") as listed:
-            targets = json.load(listed)
-        address = next(each["webSocketDebuggerUrl"] for each in targets if each["url"] == page.url)
-        self._socket, self._moves = connect(address), 0
+        def move(x: float, y: float) -> None:
+            where = {"type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1}
+            asked = {"id": next(numbers), "method": "Input.dispatchMouseEvent", "params": where}
+            chromium.send(json.dumps(asked))
 
-    def move(self, x: float, y: float) -> None:
-        """To a place of the page, with the left button pressed."""
-        self._moves += 1
-        where = {"type": "mouseMoved", "x": x, "y": y, "button": "left", "buttons": 1}
-        self._socket.send(json.dumps({"id": self._moves, "method": "Input.dispatchMouseEvent", "params": where}))
-
-    def close(self) -> None:
-        """When the page has taken all moves."""
-        while json.loads(self._socket.recv(timeout=10)).get("id") != self._moves:
+        yield move
+        last = next(numbers) - 1
+        while json.loads(chromium.recv(timeout=10)).get("id") != last:  # until the page has taken all moves
             pass
-        self._socket.close()
 
 
 def free_port() -> int:
@@ -316,11 +315,11 @@ def drag(page: Any, case: Case, port: int) -> dict[str, Any]:
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 3
     page.mouse.move(x, y)
     page.mouse.down()
-    hand, began = Hand(port, page), time.perf_counter()
-    for number in range(MOVES):
-        time.sleep(max(began + number * EVERY - time.perf_counter(), 0))
-        hand.move(x + case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
-    hand.close()
+    with hand(port, page) as move:
+        began = time.perf_counter()
+        for number in range(MOVES):
+            time.sleep(max(began + number * EVERY - time.perf_counter(), 0))
+            move(x + case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
     page.wait_for_timeout(1000 * STILL)
     page.mouse.up()
     page.wait_for_timeout(50)
