@@ -54,6 +54,13 @@ def test_finest_in_time_or_close_to_the_quickest_is_made(took, finest):
     assert set(Machine(took).drag(1)) == {finest}
 
 
+def test_first_image_of_another_kind_is_as_coarse_as_those_before():
+    machine = Machine(SLOW | {HALF: 0.1, HALF_FEW: 0.1})
+    assert machine.drag(0.5)[-1] == QUARTER
+    assert machine.pace.fineness("lens out of focus") == QUARTER
+    assert Machine(QUICK).pace.fineness("lens out of focus") == HALF
+
+
 def test_nothing_is_coarser_than_a_quarter_a_side_however_long_it_takes():
     assert max(each.pixels for each in COARSER) == 4
     assert Machine({each: 10.0 * each.share(False) for each in QUICK}).drag(20)[-1].pixels == 4

@@ -110,9 +110,11 @@ class Pace:
         return self._kept[of][1][WHOLE].recent if of in self._kept and WHOLE in self._kept[of][1] else None
 
     def fineness(self, of: Hashable) -> Fineness:
-        """The fineness of the next image; without measurements, the finest coarse one."""
+        """The fineness of the next image; without measurements, a coarse one: that of the newest kind, or the finest."""
         if of not in self._kept:
-            return COARSER[0]
+            newest = next(reversed(self._kept), None)
+            found = WHOLE if newest is None else self.fineness(newest)
+            return COARSER[0] if found == WHOLE else found
         whole = self.seconds(of)
         expected = ({} if whole is None else {WHOLE: whole}) | {each: self._expected(of, each) for each in COARSER}
         limit = max(IN_TIME, CLOSE * min(expected.values()))
