@@ -134,10 +134,6 @@ class Page:
         """An element or the sensor on the bench, by its number or its name."""
         return self.page.locator(f'[data-part="{name}"]')
 
-    def reaches(self, name, place):
-        """Wait until it is drawn at a place: in a drag it is drawn together with the next picture."""
-        self.page.wait_for_selector(f'[data-part="{name}"][aria-valuetext="{place}"]', state="attached")
-
     def place(self, name):
         """Where it stands, in words."""
         return self.part(name).get_attribute("aria-valuetext")

@@ -19,6 +19,7 @@ def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     page.page.mouse.move(x - 40, y, steps=4)
+    page.page.wait_for_timeout(100)  # the drawing follows within 50
     dragged = page.place("sensor")
     assert 44 < float(dragged.removesuffix(" mm")) < 50
     page.page.mouse.up()
@@ -113,7 +114,7 @@ def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page
         ("ArrowLeft", "52.99 mm"),
     ):
         page.page.keyboard.press(key)
-        page.reaches("sensor", place)
+        page.wait_for_place("sensor", place)
     page.page.wait_for_timeout(700)  # longer than the pause that ends a movement
     page.part("sensor").evaluate(
         "part => { for (let n = 0; n < 3; n++)"

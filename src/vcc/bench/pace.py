@@ -24,8 +24,8 @@ LEFT = 0.4
 TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
 WORTH = 1.5
-"""A coarse image is tried again if its shortest time, by how busy the machine is, is at most this times the limit; a
-whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
+"""A coarse image is tried again if its shortest time, by how busy the machine is, is at most this times the limit;
+a whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
 MOST_KINDS = 50
@@ -55,11 +55,11 @@ class Pace:
     """Chooses the fineness of an image from the times of earlier images of the same kind of camera.
 
     The finest image is chosen that is expected within `IN_TIME`, or within `CLOSE` times the quickest, by the
-    clock or by the processor time that it costs with everything around it. For a
-    coarse fineness without a measurement, the estimate is the planning time of another fineness plus its run time,
-    scaled by the work; a whole image must have been measured. A fineness that was too slow is tried again after `LEFT`, since the machine may have been
-    busy. If several kinds of images took longer than before, it was; when one is as quick as before, times that
-    were measured meanwhile are forgotten.
+    clock or by the processor time that it costs with everything around it. For a coarse fineness without a
+    measurement, the estimate is the planning time of another fineness plus its run time, scaled by the work; a
+    whole image must have been measured. A fineness that was too slow is tried again after `LEFT`, since the
+    machine may have been busy. If several kinds of images took longer than before, it was; when one is as quick as
+    before, times that were measured meanwhile are forgotten.
 
     Args:
         clock: seconds.
@@ -110,7 +110,7 @@ class Pace:
         return self._kept[of][1][WHOLE].recent if of in self._kept and WHOLE in self._kept[of][1] else None
 
     def fineness(self, of: Hashable) -> Fineness:
-        """The fineness of the next image; without measurements, a coarse one: that of the newest kind, or the finest."""
+        """The fineness of the next image; without measurements, a coarse one: as of the newest kind, or the finest."""
         if of not in self._kept:
             newest = next(reversed(self._kept), None)
             found = WHOLE if newest is None else self.fineness(newest)

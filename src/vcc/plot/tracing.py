@@ -52,8 +52,8 @@ class Paths(Brief):
     def coming_from(self, given: range) -> Paths:
         """Those of some of the given rays."""
         some = (self.origins >= given.start) & (self.origins < given.stop)
-        several = self.positions, self.shares, self.starts, self.behind, self.origins
-        return Paths(self.z, *(each[some] for each in several))
+        positions, shares, starts = self.positions[some], self.shares[some], self.starts[some]
+        return Paths(self.z, positions, shares, starts, self.behind[some], self.origins[some])
 
     @property
     def depths(self) -> Array:
