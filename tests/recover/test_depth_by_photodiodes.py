@@ -58,9 +58,7 @@ def image() -> PhotodiodeImage:
 # -- the line
 
 
-@pytest.mark.parametrize(
-    ("grid", "place"), [((1, 2), 0.0), ((2, 1), 20 * mm), ((2, 2), 0.0), ((1, 4), 20 * mm)]
-)
+@pytest.mark.parametrize(("grid", "place"), [((1, 2), 0.0), ((2, 1), 20 * mm), ((2, 2), 0.0), ((1, 4), 20 * mm)])
 def test_disparity_is_a_line_over_the_inverse_distance_to_the_lens(grid, place):
     sensor = replace(SENSOR, z=place + BEHIND, photodiodes=grid)
     line = PhotodiodeDisparity.of(vcc.Camera([vcc.Lens(FOCAL, 2 * RADIUS, z=place)], sensor))
