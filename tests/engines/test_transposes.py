@@ -169,7 +169,7 @@ def test_any_number_of_threads_gives_the_same_bytes(name, refine, roll):
     y = weights_for(core, shape)
     first = back(core, shape, y, threads=1)
     assert first.any()
-    for threads in (1, 2, 3, 16):
+    for threads in (2, 3, 16):
         assert back(core, shape, y, threads=threads).tobytes() == first.tobytes()
 
 

@@ -8,7 +8,6 @@ set here by hand, and sums the images with weights that are written here too.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -83,25 +82,22 @@ class Coloured:
 
     def truths(self) -> list[tuple[Array, float]]:
         """The image of each photodiode, (rows, columns, channels), and its error, root mean square."""
-        grid = self.case.camera.sensor.photodiodes
-        found = []
-        for place in itertools.product(*map(range, grid)):
-            each = [self._of_band(camera, place, grid) for _, camera in self.by_hand]
-            share = np.array([w * factor for (w, _), factor in zip(self.by_hand, FACTORS, strict=True)])
-            image = np.einsum(
-                "brc,kb->rck", np.array([one for one, _ in each]) * share[:, None, None], self.matrix
-            )
-            errors = np.array([error for _, error in each]) * share
-            found.append((image, float(np.sqrt(np.mean((self.matrix @ errors) ** 2)))))
-        return found
+        bands, errors = zip(*(self._of_band(camera) for _, camera in self.by_hand), strict=True)
+        share = np.array([w * factor for (w, _), factor in zip(self.by_hand, FACTORS, strict=True)])
+        images = np.einsum("bprc,b,kb->prck", np.array(bands), share, self.matrix)
+        doubts = np.sqrt(np.mean((self.matrix @ (np.array(errors) * share[:, None])) ** 2, axis=0))
+        return list(zip(images, doubts.tolist(), strict=True))
 
-    def _of_band(self, camera: vcc.Camera, place: tuple[int, int], grid: tuple[int, int]) -> tuple[Array, float]:
+    def _of_band(self, camera: vcc.Camera) -> tuple[Array, Array]:
+        """The image of each photodiode in a band, (photodiodes, rows, columns), and their errors."""
         case, scene = self.case, self.case.scene
-        if grid != (1, 1):
+        if case.camera.sensor.photodiodes != (1, 1):
             pupil = (0.0, 0.0, case.camera.sensor.microlens.pupil_distance)
-            return Pixels(camera, case, place, pupil).by_rays(scene, 1e-3, 4096)
+            return Pixels(camera, case, pupil).by_rays(scene, 1e-3, 4096)
         bench = Bench(camera, case.frame, case.shape[:2], case.flown)
-        return bench.by_means(scene, 10 ** (-(self.mark + 15) / 20)) if bench.affine else bench.by_rays(scene)
+        wanted = 10 ** (-(self.mark + 15) / 20)
+        truth, error = bench.by_means(scene, wanted) if bench.affine else bench.by_rays(scene)
+        return truth[None], np.array([error])
 
     def reached(self) -> tuple[float, float, str]:
         """Agreement of the worst photodiode in dB, the dB that are required there, and notes."""

@@ -1047,8 +1047,8 @@ class Bench:
         points, seed = 2048, 1
         while True:
             halves = [self._by_rays(scene, points, seed + n) for n in (0, 1)]
-            error = float(np.sqrt(np.mean((halves[0] - halves[1]) ** 2)) / 2)
-            if error <= wanted * halves[0].max() or points >= most:
+            error = np.sqrt(np.mean((halves[0] - halves[1]) ** 2, axis=(-2, -1))) / 2
+            if np.max(error) <= wanted * halves[0].max() or points >= most:
                 return (halves[0] + halves[1]) / 2, error
             # The error falls as points^-0.5 at the least: no more steps than it takes.
             points = min(most, points * 4)
@@ -1058,8 +1058,8 @@ class Bench:
         scatterers = sum(sheet.scatter is not None for sheet in self.sheets)
         even = qmc.Sobol(4 + 3 * scatterers, seed=seed).random(points).T
         rng = np.random.default_rng(seed)
-        total = np.zeros(self.shape)
-        for row, y in enumerate(self.y):
+        rows = []
+        for y in self.y:
             turn = rng.random((4 + 3 * scatterers, self.x.size, 1))  # each pixel's own points
             drawn = (even[:, None, :] + turn) % 1.0
             X = self.x[:, None] + (drawn[0] - 0.5) * self.sides[1]
@@ -1068,8 +1068,8 @@ class Bench:
             ray = _applied(aim.rays, (X, Y, a, b))
             at_views, through = self._walked(ray, drawn[4:])
             light = through * scene.radiance(*_applied(self.home, at_views))
-            total[row] = light.mean(axis=1) * aim.solid_angle
-        return total
+            rows.append(light.mean(axis=-1) * aim.solid_angle)
+        return np.stack(rows, axis=-2)
 
     def _walked(self, ray: tuple[Array, ...], drawn: Array) -> tuple[tuple[Array, ...], Array]:
         """Rays at the sensor, traced back to the plane of the views: rays there, and the share that passes."""

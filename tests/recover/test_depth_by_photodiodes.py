@@ -58,9 +58,8 @@ def image() -> PhotodiodeImage:
 # -- the line
 
 
-@pytest.mark.parametrize("place", [0.0, 20 * mm])
-@pytest.mark.parametrize("grid", [(1, 2), (2, 1), (2, 2), (1, 4)])
-def test_disparity_is_a_line_over_the_inverse_distance_to_the_lens(place, grid):
+@pytest.mark.parametrize(("grid", "place"), [((1, 2), 0.0), ((2, 1), 20 * mm), ((2, 2), 0.0), ((1, 4), 20 * mm)])
+def test_disparity_is_a_line_over_the_inverse_distance_to_the_lens(grid, place):
     sensor = replace(SENSOR, z=place + BEHIND, photodiodes=grid)
     line = PhotodiodeDisparity.of(vcc.Camera([vcc.Lens(FOCAL, 2 * RADIUS, z=place)], sensor))
     assert line.axis == (1 if grid[1] > 1 else 0)
@@ -126,8 +125,7 @@ def test_the_left_one_behind_the_focus_is_the_right_one_in_front(diameter):
 # -- depth
 
 
-@pytest.mark.parametrize("distance", [NEAR, FAR])
-@pytest.mark.parametrize("period", [10, 20])
+@pytest.mark.parametrize(("distance", "period"), [(NEAR, 10), (FAR, 20)])
 def test_the_disparity_of_a_wave_is_the_phase_between_half_discs(distance, period):
     """Of one wave along x: 2·arg K/ω of the transform of half a disc, 1 to 3 % less than that of the centroids."""
     wide = period * PITCH / BEHIND * distance

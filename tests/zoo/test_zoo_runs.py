@@ -16,8 +16,9 @@ from vcc.zoo import Report, run, running, scenes
 from vcc.zoo.entrants import codes, open_square
 
 SLOW = ("plug-and-play", "denoised", "total variation", "cubic plate", "random-phase plate", "radial plate")
-FEWER = ("Levin code", "Zhou–Nayar code", "round 10 %", "round 4 %", "round 1 %")
-FAST = {"seeds": 2, "without": (*SLOW, *FEWER), "scenes": ("leaves-3", "leaves-4")}
+FEWER = ("Levin code", "Zhou–Nayar code", "round 10 %", "round 4 %", "round 1 %", "round 78.5 %")
+TIMES = ("open, 78.5 % of the time", "open, 25.4 % of the time")
+FAST = {"seeds": 2, "without": (*SLOW, *FEWER, *TIMES), "scenes": ("leaves-3", "leaves-4")}
 HALF = "def half(recorded):\n    return recorded.values * 0 + 0.5\n"
 
 
@@ -167,7 +168,8 @@ def test_tasks_with_views_and_bands_are_kept_and_shown(tmp_path, monkeypatch):
         for camera, *cells in report.rows(level)[1:]:
             suited = [bool(len(report.by_scene(camera, name, level))) for name in report.names("decoder")]
             assert [bool(cell) for cell in cells[1 : 1 + len(suited)]] == suited
-        done = command("zoo", "page", str(path), "--task", task, "-o", str(tmp_path / task))
-        assert done.exit_code == 0, done.stderr
+        if task != "refocusing":  # its page shows views, as the first one does
+            done = command("zoo", "page", str(path), "--task", task, "-o", str(tmp_path / task))
+            assert done.exit_code == 0, done.stderr
     assert report.found[0].picture.shape == (96, 103, 3)
     scenes.scene.cache_clear()
