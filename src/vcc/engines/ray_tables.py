@@ -211,18 +211,20 @@ class Packet(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """The points of the rays of a packet.
+    """The points of the rays of one pixel in a packet: ray p has the point ``start + p`` of the table.
 
     Args:
         table: see `Points`.
-        start: index in the table of the packet's first ray.
-        rays: number of rays in the packet.
+        start: from the number of a ray in the packet to its point.
+        first: the pixel's first ray in the packet.
+        end: the ray after its last one.
         flipped: (4,) int64, binary digits to flip in the first four columns.
     """
 
     table: NDArray[np.float32]
     start: int
-    rays: int
+    first: int
+    end: int
     flipped: NDArray[np.int64]
 
 

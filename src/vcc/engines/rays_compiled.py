@@ -103,8 +103,9 @@ def _tile_of_parts(
 def _tile(*given: Any) -> int:
     """Trace the pixels of a tile with `kernels.add_pixels`, in new buffers; return the number of traced rays."""
     lanes = max(given[0].samples.channels, LANES)
-    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, dtype=np.int64)
-    kernels.add_pixels(*given, working_arrays(), sums)
+    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(3, dtype=np.int64)
+    owners = np.empty((kernels.PACKET, 2), dtype=np.int64)
+    kernels.add_pixels(*given, working_arrays(), (*sums, owners))
     return int(sums[2][0])
 
 
