@@ -169,6 +169,14 @@ def test_every_step(name):
     assert_engines_agree(camera(name), field(samples()))
 
 
+@pytest.mark.parametrize("rays", [2, 512])
+@pytest.mark.parametrize("name", ["cells, square", "real lens"])
+def test_few_rays_and_many(name, rays):
+    # The compiled loops trace many pixels together, or one in several parts.
+    cam = vcc.Camera([LENS, *ELEMENTS[name]], vcc.Sensor(D, (35, 34), D * 2e-3 * 0.6))
+    assert_engines_agree(cam, field(samples((*SHAPE, 3))), samples=rays)
+
+
 @pytest.mark.parametrize("library", list(LIBRARIES))
 @pytest.mark.parametrize("name", ["cells, square", "coded diffuser, mixed"])
 def test_every_library(name, library):

@@ -51,6 +51,8 @@ from vcc.plan.rays.points import DIGITS, FIRST_COLUMNS
 
 PACKET = 256
 """Rays of a packet: their six numbers each stay in the first-level cache."""
+TOGETHER = 64
+"""Rays up to which pixels share a packet: loops over fewer do not pay for their start."""
 
 
 @ray_inner
@@ -61,7 +63,7 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         field: as for `add_pixels`, like the other arguments that are not listed here.
         drawn: all rays of the packet; scattering steps read its points, and then it is of one pixel.
         rays: of the pixels in ``owners``, one after the other, equally many each.
-        owners: (pixels, 2): the number of a pixel, and the first ray of the second half of its rays.
+        owners: (pixels, 4): the number of a pixel, its row and column, and where the second half of its rays begins.
     """
     samples = field.samples
     channels, (sums, totals, tally, _) = samples.channels, sums
@@ -79,8 +81,8 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         if pixel != tally[1]:  # else the pixel has rays in the packet before this one, or through another cell
             totals[:] = 0
             tally[1] = pixel
-        add_rays(field, begin, rays, number * n, (number + 1) * n, owners[number, 1], sums)
-        row, column = pixel // pictures.shape[2], pixel % pictures.shape[2]
+        add_rays(field, begin, rays, number * n, (number + 1) * n, owners[number, 3], sums)
+        row, column = owners[number, 1], owners[number, 2]
         for half in range(2):  # single precision within a packet, double across packets
             for lane in range(sums.shape[1]):
                 totals[half, lane] += sums[half, lane]
@@ -119,44 +121,44 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
     tally, owners = sums[2], sums[3]
     tally[1], tally[2] = -1, samples
     n = min(PACKET, samples)
-    most = PACKET // n if len(table) == FIRST_COLUMNS else 1  # diffusers have further columns
-    columns = min(tile.end_column, sensor.columns) - tile.first_column
+    most = max(TOGETHER // n, 1) if len(table) == FIRST_COLUMNS else 1  # diffusers have further columns
     filled = 0
-    for number in range((min(tile.end_row, sensor.rows) - tile.first_row) * columns):
-        if ended[0]:
-            return
-        row, column = tile.first_row + number // columns, tile.first_column + number % columns
-        pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
-        first = first_point(points, pixel)
-        seen = 1
-        if cells is not None:
-            seen = cells_at(True, cells, middle, sensor.sensitive, near)
-        for q in range(seen):
-            if window is not None:
-                for digit in range(4):
-                    flipped[digit] = hashed(pixel, seed + 1 + digit) >> np.uint32(32 - DIGITS)
+    for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
+        for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
+            if ended[0]:
+                return
+            pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
+            first = first_point(points, pixel)
+            seen = 1
             if cells is not None:
-                turn_to(True, cells, seed, pixel, near, q, images, flipped)
-            for done in range(0, samples, PACKET):
-                at = filled * n
-                drawn = Drawn(table, first + done - at, at, at + n, flipped)
-                at_pixel(drawn, middle, sensor.sensitive, rays)
+                seen = cells_at(True, cells, middle, sensor.sensitive, near)
+            for q in range(seen):
                 if window is not None:
-                    through_window(drawn, window, rays)
+                    for digit in range(4):
+                        flipped[digit] = hashed(pixel, seed + 1 + digit) >> np.uint32(32 - DIGITS)
                 if cells is not None:
-                    through_cell(drawn, images, cells, rays)
-                sent = 0
-                for p in range(at, at + n):
-                    sent += share[p] > 0.0
-                if sent == 0:
-                    continue
-                tally[0] += sent
-                owners[filled, 0], owners[filled, 1] = pixel, at + samples // 2 - done
-                filled += 1
-                if filled == most:
-                    packet = Drawn(table, first + done - at, 0, at + n, flipped)
-                    add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
-                    filled = 0
+                    turn_to(True, cells, seed, pixel, near, q, images, flipped)
+                for done in range(0, samples, PACKET):
+                    at = filled * n
+                    drawn = Drawn(table, first + done - at, at, at + n, flipped)
+                    at_pixel(drawn, middle, sensor.sensitive, rays)
+                    if window is not None:
+                        through_window(drawn, window, rays)
+                    if cells is not None:
+                        through_cell(drawn, images, cells, rays)
+                    sent = 0
+                    for p in range(at, at + n):
+                        sent += share[p] > 0.0
+                    if sent == 0:
+                        continue
+                    tally[0] += sent
+                    owner = owners[filled]
+                    owner[0], owner[1], owner[2], owner[3] = pixel, row, column, at + samples // 2 - done
+                    filled += 1
+                    if filled == most:
+                        packet = Drawn(table, first + done - at, 0, at + n, flipped)
+                        add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
+                        filled = 0
     if filled > 0:
         packet = Drawn(table, 0, 0, filled * n, flipped)
         add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)

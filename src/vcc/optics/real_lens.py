@@ -22,7 +22,7 @@ from vcc.optics.band import Band
 from vcc.optics.faces import Element, Faces, Part, Way
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.prescription import Prescription, Reference, Surface
-from vcc.optics.refraction import Refraction, lit, traced
+from vcc.optics.refraction import Refraction, traced, traced_on
 from vcc.optics.visible_pupil import Passes, tables_of
 from vcc.shapes.patterns import Circle, Pattern
 
@@ -353,11 +353,13 @@ class RealLens(TracedLens):
             image = np.stack([points[:, 0], np.zeros(len(points))], axis=-1)
             slope = (image - from_place * place) / gain
             rays = np.concatenate([place - distance * slope, slope], axis=-1)
-            return lit(surfaces, rays)
+            passed = np.zeros(len(rays), dtype=np.bool_)
+            passed[traced_on(surfaces, rays)[1]] = True
+            return passed
 
         return passes
 
-    def visible_pupil(self, seen: Seen, radius: float) -> Array | None:
+    def visible_pupil(self, seen: Seen, radius: float, check: Callable[[], None] = lambda: None) -> Array | None:
         """The part of the disc of `window` that places on the sensor see, as `vcc.optics.visible_pupil.tables_of`.
 
         None for soft edges, which gradients need: then the part changes with the lens, and tables of it would too.
@@ -365,6 +367,7 @@ class RealLens(TracedLens):
         Args:
             seen: how the sensor sees the end of the lens.
             radius: of the disc, metres.
+            check: called every few milliseconds; an exception that it raises ends the computation.
         """
         distance = self._pupil_distance
         gain = seen.gain(distance)
@@ -372,7 +375,12 @@ class RealLens(TracedLens):
             return None
         passes = self._passes(distance, seen.from_place, gain)
         unit = np.array([1.0, radius, radius])
-        return tables_of(lambda points: passes(points * unit), seen.radius)
+
+        def seen_from(points: Array) -> NDArray[np.bool_]:
+            check()
+            return passes(points * unit)
+
+        return tables_of(seen_from, seen.radius)
 
     def _widest(self, distance: float) -> float:
         """As `_widest_seen`, for light that goes anywhere: rays from all over the stop in all directions."""
@@ -471,6 +479,11 @@ class Seen:
     def gain(self, distance: float) -> float:
         """From slopes to places on the sensor, for rays from a place ``distance`` behind the end, metres."""
         return self.from_slope - distance * self.from_place
+
+    def rounded(self) -> Seen:
+        """From the nearest of distances 1 % apart: at half of this, a double Gauss loses 0.05 % of its light."""
+        steps = round(100 * math.log(max(abs(self.from_slope), 1e-9)))
+        return replace(self, from_slope=math.copysign(math.exp(steps / 100), self.from_slope))
 
 
 @lru_cache(maxsize=64)
