@@ -300,3 +300,16 @@ def test_twice_the_samples_are_the_first_ones_and_as_many_more():
     whole = cam.capture(lf, samples=32)
     assert np.abs(many.values - whole.values).max() < 1e-6 * whole.values.max()
     assert many.sampling_error == pytest.approx(whole.sampling_error, rel=1e-4)
+
+
+def test_an_image_can_be_ended_after_each_row_of_views_that_is_sharpened():
+    told = []
+
+    def progress(done, total):
+        told.append(done)
+        if len(told) == 2:
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        camera("cells, square").capture(field(samples()), progress=progress)
+    assert told == [0, 0]

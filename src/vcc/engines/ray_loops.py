@@ -1,9 +1,10 @@
 """The compiled loops over pixels, packets and tiles that trace rays; see `vcc.engines.ray_tables`.
 
 One loop serves every camera: the steps of a ray are a list of numbers, `vcc.engines.ray_steps`. A packet holds
-the rays of one pixel; for images, those of as many neighbours as it has room for. Its stages are separate functions, compiled once for all loops and all types of samples:
-inlined in each loop, they took three times as long to compile. Python allocates the arrays that loops work in: a
-wrapper kernel that did so was optimised with the whole loop in it a second time.
+the rays of one pixel, or of several neighbours that have few rays each. Its stages are separate functions,
+compiled once for all loops and all types of samples: inlined in each loop, they took three times as long to
+compile. Python allocates the arrays that loops work in: a wrapper kernel that did so was optimised with the
+whole loop in it a second time.
 
 `add_pixels` sums the samples that the rays of each pixel read. The transpose to samples has two stages, because
 rays of neighbouring pixels read the same samples. `find_tile` traces the rays and sorts them by the view that
@@ -63,7 +64,7 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         field: as for `add_pixels`, like the other arguments that are not listed here.
         drawn: all rays of the packet; scattering steps read its points, and then it is of one pixel.
         rays: of the pixels in ``owners``, one after the other, equally many each.
-        owners: (pixels, 4): the number of a pixel, its row and column, and where the second half of its rays begins.
+        owners: (pixels, 4): number, row and column of a pixel, and where the second half of its rays begins.
     """
     samples = field.samples
     channels, (sums, totals, tally, _) = samples.channels, sums
