@@ -300,7 +300,7 @@ class Drive:
     def _run(self, core: Any, values: Any, beside: int, progress: Progress | None = None) -> Partial:
         return self.engine.run(core, values, beside=int(beside > 0), threads=self.threads, progress=progress)
 
-    def taken(self, progress: Progress | None) -> Any:
+    def taken(self, progress: Progress | None = None) -> Any:
         """The input of the core if all samples are in memory: `prepared`, which may exist already, or the samples
         that the engine prepares for this core's rays alone; both are kept for further rounds.
 
