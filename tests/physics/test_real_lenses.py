@@ -232,7 +232,10 @@ def test_all_light_for_sensors_nearby_passes_a_window_that_is_searched_once():
         # Brute force: from places on the sensor to places in a wider window, back through all surfaces.
         way, away = random.uniform(0, 2 * np.pi, (2, 20000)), np.sqrt(random.uniform(size=(2, 20000)))
         angles = np.stack([np.cos(way), np.sin(way)], axis=-1)
-        at_sensor, at_window = 21.6 * mm * away[0, :, None] * angles[0], 1.2 * radius * away[1, :, None] * angles[1]
+        at_sensor, at_window = (
+            21.6 * mm * away[0, :, None] * angles[0],
+            1.2 * radius * away[1, :, None] * angles[1],
+        )
         window = flight.linear[0, 2]
         slopes = (at_sensor - at_window) / (distance - window)
         rays = np.concatenate([at_window - window * slopes, slopes], axis=-1)

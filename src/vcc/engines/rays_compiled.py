@@ -27,7 +27,7 @@ from vcc.plan.rays.model import Rays
 TILE = 32
 """Side, in pixels, of the tile that a thread works on: the samples that the tile reads stay in the cache."""
 FEW_RAYS = 8
-"""Rays a pixel up to which tiles are twice as large, because each costs a tenth of a millisecond in Python."""
+"""Rays a pixel up to which tiles are twice as large, so that handing them to threads costs less."""
 
 _NOWHERE = (0.0, 0.0)
 ALL_VISIBLE = np.zeros((0, 0)), _NOWHERE, 0.0
