@@ -226,6 +226,7 @@ def test_all_light_for_sensors_nearby_passes_a_window_that_is_searched_once():
     random, searched = np.random.default_rng(1), []
     for distance in np.array([60.0, 60.1, 60.2]) * mm:
         seen = Seen(1.0, distance, (0.0, 0.0), 21.6 * mm)
+        lens = replace(lens, z=lens.z + 1 * mm, transmission=[0.9] * len(lens.prescription.surfaces))
         flight, disc, _ = lens.window(seen)
         searched.append(_widest_through.cache_info().misses)
         radius = disc.pattern.diameter / 2

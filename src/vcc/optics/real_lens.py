@@ -333,8 +333,14 @@ class RealLens(TracedLens):
         if abs(gain) < NO_GAIN:
             return None
         nearest = math.copysign(_power_of_step(abs(gain), math.floor), gain)
-        lens = replace(self, z=0.0, decentre=(0.0, 0.0), name="")
-        return _widest_through(lens, distance, seen.from_place, nearest, _power_of_step(seen.radius, math.ceil))
+        radius = _power_of_step(seen.radius, math.ceil)
+        return _widest_through(self._alone, distance, seen.from_place, nearest, radius)
+
+    @property
+    def _alone(self) -> RealLens:
+        """The lens without all that does not change which rays pass: equal for lenses that pass the same rays."""
+        mask = None if self.mask is None else Circle(max(self._mask_size()))
+        return replace(self, z=0.0, decentre=(0.0, 0.0), name="", mask=mask, transmission=1.0)
 
     def _passes(self, distance: float, from_place: float, gain: float) -> Passes:
         """Whether light for places p on the sensor passes places (a, b) in a plane, all in metres; see `Passes`.
@@ -381,6 +387,10 @@ class RealLens(TracedLens):
             return passes(points * unit)
 
         return tables_of(seen_from, seen.radius)
+
+    def visible_nearby(self, seen: Seen, radius: float) -> Array | None:
+        """As `visible_pupil`, for all sensors of which `Seen.rounded` is the same: computed once for them."""
+        return _visible_through(self._alone, seen.rounded(), radius)
 
     def _widest(self, distance: float) -> float:
         """As `_widest_seen`, for light that goes anywhere: rays from all over the stop in all directions."""
@@ -515,6 +525,12 @@ def _widest_through(
     if widest <= 0:
         return None
     return _refined(points, away, met, np.array([1 / 6, reach / 40, np.pi / 12]))
+
+
+@lru_cache(maxsize=64)
+def _visible_through(lens: RealLens, seen: Seen, radius: float) -> Array | None:
+    """See `RealLens.visible_nearby`."""
+    return lens.visible_pupil(seen, radius)
 
 
 def _refined(points: Array, away: Array, met: Callable[[Array], Array], step: Array) -> float:

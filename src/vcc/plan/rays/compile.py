@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from vcc.optics.aberrations import Aberrations
 from vcc.optics.deflections import CellDeflection, Deflection, FacetDeflection
 from vcc.optics.faces import Element
 from vcc.optics.ray_map import RayMap
-from vcc.optics.real_lens import RealLens, Seen
+from vcc.optics.real_lens import RealLens
 from vcc.optics.scatter import Scatter, SheetMap
 from vcc.optics.terms import RayTransmission
 from vcc.optics.train import Stage, Train
@@ -440,18 +440,12 @@ def _at_what_is_visible(path: Path, aim: Aim, parts: Parts) -> Aim:
                 made = partial(lens.visible_pupil, seen, disc.diameter / 2, parts.check)
                 table = parts.part("visible pupil", partial(content, (lens, seen, disc.diameter)), made)
             else:
-                table = _visible_nearby(replace(lens, z=0.0), seen.rounded(), disc.diameter / 2)
+                table = lens.visible_nearby(seen, disc.diameter / 2)
             if table is None:
                 return aim
             assert isinstance(aim, Window)
             return replace(aim, visible=VisiblePupil(table, seen.axis, seen.radius / (len(table) - 1)))
     return aim
-
-
-@lru_cache(maxsize=64)
-def _visible_nearby(lens: RealLens, seen: Seen, radius: float) -> Array | None:
-    """What sensors nearby see of a pupil, for drafts of all of them."""
-    return lens.visible_pupil(seen, radius)
 
 
 def _is_aimed_at(aim: Aim, leg: Leg) -> bool:
