@@ -72,7 +72,7 @@ def trace(channels: int, by_cell: bool) -> Any:
                         ray_aims.turn_to(by_cell, cells, seed, pixel, near, q, images, flipped)
                         begin = half * (samples // 2)
                         for p in range(begin, begin + samples // 2):
-                            drawn = Drawn(table, first + p, 0, 1, flipped)
+                            drawn = Drawn(table, first + p, 1, flipped)
                             _at_pixel(drawn, middle, sensor.sensitive, rays)
                             if by_cell:
                                 _through_cell(drawn, images, cells, rays)

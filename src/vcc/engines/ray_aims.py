@@ -49,11 +49,11 @@ def unit(point, flipped):  # type: ignore[no-untyped-def]
 @ray_inner
 def at_pixel(drawn, middle, sensitive, rays):  # type: ignore[no-untyped-def]
     """Set the positions of a packet's rays on the sensitive area of a pixel."""
-    points, start, first, end, flipped = drawn
+    points, start, n, flipped = drawn
     x, y = rays.x, rays.y
     (middle_x, middle_y), (wide, high) = middle, sensitive
     across, down = np.int32(flipped[0]), np.int32(flipped[1])
-    for p in range(first, end):
+    for p in range(n):
         x[p] = middle_x + (unit(points[0, start + p], across) - 0.5) * wide
         y[p] = middle_y + (unit(points[1, start + p], down) - 0.5) * high
 
@@ -165,7 +165,7 @@ def visible_point(window, x, y, a, b):  # type: ignore[no-untyped-def]
 @ray_inner
 def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     """Slopes and weights of rays towards a `vcc.plan.rays.bounds.windows.Window`, with diffusers compensated."""
-    points, start, first, end, flipped = drawn
+    points, start, n, flipped = drawn
     from_point, from_sensor, (f4, g4) = window.from_point, window.from_sensor, window.offset
     solid_angle, disc, scatter, visible = window.solid_angle, window.disc, window.scatter, window.visible
     x, y, s, t, share = rays
@@ -174,7 +174,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
     cosine, sine = math.cos(turn), math.sin(turn)
     if len(visible) > 0:
-        for p in range(first, end):
+        for p in range(n):
             a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
             a, b = cosine * a - sine * b, sine * a + cosine * b
             a, b, part = visible_point(window, x[p], y[p], a, b)
@@ -186,7 +186,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
             f0, f1 = f0 * cosine + f1 * sine, f1 * cosine - f0 * sine
             g0, g1 = g0 * cosine + g1 * sine, g1 * cosine - g0 * sine
         across, down = np.int32(flipped[2]), np.int32(flipped[3])
-        for p in range(first, end):
+        for p in range(n):
             a, b = np.float64(points[2, start + p]), np.float64(points[3, start + p])
             if not disc:
                 a, b = 2.0 * unit(points[2, start + p], across) - 1.0, 2.0 * unit(points[3, start + p], down) - 1.0
@@ -196,7 +196,7 @@ def through_window(drawn, window, rays):  # type: ignore[no-untyped-def]
     for term in range(len(scatter)):
         column = int(scatter[term, 0])
         f0, f1, g0, g1 = scatter[term, 1], scatter[term, 2], scatter[term, 3], scatter[term, 4]
-        for p in range(first, end):
+        for p in range(n):
             a, b = points[column, start + p], points[column + 1, start + p]
             s[p] += f0 * a + f1 * b
             t[p] += g0 * a + g1 * b
@@ -209,14 +209,14 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
     ``images``: (2, 5), see `set_image`. Until the last loop, s holds positions across, t and share the ends of
     the visible part there.
     """
-    points, start, first, end, flipped = drawn
+    points, start, n, flipped = drawn
     x, y, s, t, share = rays
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
     middle_y, along_y, half_y, centre_y = images[1, 0], images[1, 1], images[1, 2], images[1, 3]
     radius, borders = cells.opening_radius, cells.borders
     across, down = np.int32(flipped[2]), np.int32(flipped[3])
     per_half = cells.disc / half  # all chords of a rectangle are equal
-    for p in range(first, end):
+    for p in range(n):
         image = middle + along * x[p]
         low = max(image - half, centre - reach)
         a = low + max(min(image + half, centre + reach) - low, 0.0) * unit(points[2, start + p], across)
@@ -226,18 +226,18 @@ def through_cell(drawn, images, cells, rays):  # type: ignore[no-untyped-def]
         s[p], t[p], share[p] = a, image - chord, image + chord
     for strip in range(len(borders)):
         slope, tall = borders[strip, 0], borders[strip, 1]
-        for p in range(first, end):
+        for p in range(n):
             border = centre_y + slope * (s[p] - centre)
             t[p], share[p] = max(t[p], border - tall), min(share[p], border + tall)
     if radius < np.inf:
-        for p in range(first, end):
+        for p in range(n):
             away = s[p] - centre
             chord = math.sqrt(max(radius * radius - away * away, 0.0))
             t[p], share[p] = max(t[p], centre_y - chord), min(share[p], centre_y + chord)
     per_slope_x, per_slope_y = 1 / cells.place_from_slope[0], 1 / cells.place_from_slope[1]
     weight = abs(per_slope_x * per_slope_y)
     (from_x, from_y), (offset_x, offset_y) = cells.place_from_sensor, cells.offset
-    for p in range(first, end):
+    for p in range(n):
         image = middle + along * x[p]
         wide = max(min(image + half, centre + reach) - max(image - half, centre - reach), 0.0)
         tall = max(share[p] - t[p], 0.0)
@@ -263,7 +263,7 @@ def aim_rays(aim, drawn, middle, sensitive, images, rays):  # type: ignore[no-un
 @ray_back
 def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
     """Gradients of the rays' positions on the sensor to its first pixel, pitch and sensitive area."""
-    points, start, _, n, flipped = drawn
+    points, start, n, flipped = drawn
     for q in range(2):
         digits, number = np.int32(flipped[q]), place[1 - q]
         total = of_area = 0.0
@@ -278,7 +278,7 @@ def pixel_back(drawn, place, bar, own):  # type: ignore[no-untyped-def]
 @ray_back
 def window_back(drawn, window, rays, bar, own, of_scatter, out_points):  # type: ignore[no-untyped-def]
     """Gradients of slopes and weights through a window to positions, drawn points and its parameters."""
-    points, start, _, n, flipped = drawn
+    points, start, n, flipped = drawn
     from_sensor, disc, scatter = window.from_sensor, window.disc, window.scatter
     narrowed = len(window.visible) > 0
     turn = 2.0 * math.pi * DIGITS_BELOW * flipped[2]
@@ -335,7 +335,7 @@ def cell_back(drawn, images, cells, cell, rays, bar, of_cells):  # type: ignore[
     middle, of these times the position, of its half size, of the cell's centre. ``of_cells``: (cells, kinds,
     borders) of `vcc.engines.ray_tables.RayGradients`, and a buffer for the sums, (2, 4).
     """
-    points, start, _, n, flipped = drawn
+    points, start, n, flipped = drawn
     middle, along, half, centre, reach = images[0, 0], images[0, 1], images[0, 2], images[0, 3], images[0, 4]
     middle_y, along_y, half_y, centre_y = images[1, 0], images[1, 1], images[1, 2], images[1, 3]
     radius, borders, disc = cells.opening_radius, cells.borders, cells.disc

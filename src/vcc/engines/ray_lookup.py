@@ -171,8 +171,8 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 
 @ray_inlined
-def add_rays(field, begin, rays, first, end, second, sums):  # type: ignore[no-untyped-def]
-    """Look up some rays of a packet in the light field and add the results to sums (half, `LANES` or channels).
+def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
+    """Look up n rays of a packet in the light field and add the results to sums (half, `LANES` or channels).
 
     The packet holds indices, from `to_indices`. Rays from ``second`` on belong to the second half.
     """
@@ -186,7 +186,7 @@ def add_rays(field, begin, rays, first, end, second, sums):  # type: ignore[no-u
     line, picture, row_of_views = wide * channels, high * wide * channels, nu * high * wide * channels
     last = len(values) - LANES
     views, dark = (nv, nu, nt, ns), dark_from(motion)
-    for p in range(first, end):
+    for p in range(n):
         weight = share[p]
         if weight == 0.0:
             continue

@@ -46,7 +46,7 @@ from vcc.engines.ray_lookup import (
     weights_in_four_views,
 )
 from vcc.engines.ray_steps import moved_back, packet_of, step_back, step_on, take_few_steps, take_steps
-from vcc.engines.ray_tables import Drawn
+from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spread_views_of_4
 from vcc.plan.rays.points import DIGITS, FIRST_COLUMNS
 
@@ -54,6 +54,15 @@ PACKET = 256
 """Rays of a packet: their six numbers each stay in the first-level cache."""
 TOGETHER = 64
 """Rays up to which pixels share a packet: loops over fewer do not pay for their start."""
+
+
+@ray_inlined
+def part_of(rays, first, n):  # type: ignore[no-untyped-def]
+    """n rays of a packet. Loops that begin at 0 need no check for places before the array, so they vectorise."""
+    end = first + n
+    return Packet(
+        rays.x[first:end], rays.y[first:end], rays.s[first:end], rays.t[first:end], rays.share[first:end]
+    )
 
 
 @ray_inner
@@ -64,7 +73,7 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         field: as for `add_pixels`, like the other arguments that are not listed here.
         drawn: all rays of the packet; scattering steps read its points, and then it is of one pixel.
         rays: of the pixels in ``owners``, one after the other, equally many each.
-        owners: (pixels, 4): number, row and column of a pixel, and where the second half of its rays begins.
+        owners: (pixels, 4): number, row and column of a pixel, and which of its rays begins the second half.
     """
     samples = field.samples
     channels, (sums, totals, tally, _) = samples.channels, sums
@@ -72,8 +81,8 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         take_few_steps(steps, drawn, rays)
     if rare is not None:
         take_steps(steps, drawn, rays)
-    to_indices(field.index_from_ray, rays, drawn.end)
-    n = drawn.end // len(owners)
+    to_indices(field.index_from_ray, rays, drawn.rays)
+    n = drawn.rays // len(owners)
     factor = field.scale / tally[2]
     # Vector code keeps left and right pixels of the samples in separate lanes: add them.
     apart = channels == 1 or channels == 3 or channels == 4
@@ -82,7 +91,7 @@ def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, su
         if pixel != tally[1]:  # else the pixel has rays in the packet before this one, or through another cell
             totals[:] = 0
             tally[1] = pixel
-        add_rays(field, begin, rays, number * n, (number + 1) * n, owners[number, 3], sums)
+        add_rays(field, begin, part_of(rays, number * n, n), n, owners[number, 3], sums)
         row, column = owners[number, 1], owners[number, 2]
         for half in range(2):  # single precision within a packet, double across packets
             for lane in range(sums.shape[1]):
@@ -118,7 +127,6 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
     """
     table, samples, _, seed = points
     rays, near, images, flipped = within
-    share = rays.share
     tally, owners = sums[2], sums[3]
     tally[1], tally[2] = -1, samples
     n = min(PACKET, samples)
@@ -141,27 +149,27 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
                     turn_to(True, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
                     at = filled * n
-                    drawn = Drawn(table, first + done - at, at, at + n, flipped)
-                    at_pixel(drawn, middle, sensor.sensitive, rays)
+                    drawn, own = Drawn(table, first + done, n, flipped), part_of(rays, at, n)
+                    at_pixel(drawn, middle, sensor.sensitive, own)
                     if window is not None:
-                        through_window(drawn, window, rays)
+                        through_window(drawn, window, own)
                     if cells is not None:
-                        through_cell(drawn, images, cells, rays)
+                        through_cell(drawn, images, cells, own)
                     sent = 0
-                    for p in range(at, at + n):
-                        sent += share[p] > 0.0
+                    for p in range(n):
+                        sent += own.share[p] > 0.0
                     if sent == 0:
                         continue
                     tally[0] += sent
                     owner = owners[filled]
-                    owner[0], owner[1], owner[2], owner[3] = pixel, row, column, at + samples // 2 - done
+                    owner[0], owner[1], owner[2], owner[3] = pixel, row, column, samples // 2 - done
                     filled += 1
                     if filled == most:
-                        packet = Drawn(table, first + done - at, 0, at + n, flipped)
+                        packet = Drawn(table, first + done, at + n, flipped)
                         add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
                         filled = 0
     if filled > 0:
-        packet = Drawn(table, 0, 0, filled * n, flipped)
+        packet = Drawn(table, 0, filled * n, flipped)
         add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
 
 
@@ -239,7 +247,7 @@ def find_tile(look, sensor, points, aim, steps, ended, start, tile, found, withi
             turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
             for done in range(0, samples, PACKET):
                 n = min(PACKET, samples - done)
-                drawn = Drawn(table, first + done, 0, n, flipped)
+                drawn = Drawn(table, first + done, n, flipped)
                 aim_rays(aim, drawn, middle, sensor.sensitive, images, rays)
                 sent = 0
                 for p in range(n):
@@ -334,7 +342,7 @@ def packet_back(field, drawn, aim, images, cell, steps, place, weights, ways, gr
     `cell_back`).
     """
     kept, lit, bar, found, sums = ways
-    n, number = drawn.end, len(steps.codes)
+    n, number = drawn.rays, len(steps.codes)
     if lit_by(kept[0, 4], n, lit) > 0:
         for step in range(number):
             step_on(steps, step, drawn, kept[step], kept[step + 1], lit)
@@ -379,7 +387,7 @@ def gradients_of_tiles(field, sensor, points, aim, steps, weights, ended, gradie
                 for q in range(cells_at(aim.by_cell, cells, middle, sensor.sensitive, near)):
                     turn_to(aim.by_cell, cells, seed, pixel, near, q, images, flipped)
                     for done in range(0, samples, PACKET):
-                        drawn = Drawn(table, first + done, 0, min(PACKET, samples - done), flipped)
+                        drawn = Drawn(table, first + done, min(PACKET, samples - done), flipped)
                         aim_rays(aim, drawn, middle, sensor.sensitive, images, at_sensor)
                         packet_back(
                             field, drawn, aim, images, near[q], steps, (row, column), weights, ways, gradients

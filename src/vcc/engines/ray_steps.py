@@ -160,7 +160,7 @@ FEW = frozenset({0, 6, 7})
 def take_few_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     """As `take_steps` if all steps are in `FEW`; compiling these takes a tenth of the time."""
     codes, _, real, _, _ = steps
-    n = drawn.end
+    n = drawn.rays
     x, y, s, t, share = rays
     for step in range(len(codes)):
         code, f = codes[step], real[step]
@@ -179,7 +179,7 @@ def take_steps(steps, drawn, rays):  # type: ignore[no-untyped-def]
     The numbers of a step are read before its loop: loops without branches vectorise over rays.
     """
     codes, whole, real, shares, slopes = steps
-    points, first, _, n, _ = drawn
+    points, first, n, _ = drawn
     x, y, s, t, share = rays
     for step in range(len(codes)):
         code, a, f = codes[step], whole[step], real[step]
@@ -292,7 +292,7 @@ def packet_of(numbers):  # type: ignore[no-untyped-def]
 def step_on(steps, number, drawn, before, behind, lit):  # type: ignore[no-untyped-def]
     """Take a packet (5, rays) through one step; ``lit`` becomes 0 for rays that a hard edge stops."""
     codes, whole, real, shares, slopes = steps
-    n, code, a, f = drawn.end, codes[number], whole[number], real[number]
+    n, code, a, f = drawn.rays, codes[number], whole[number], real[number]
     for q in range(5):
         for p in range(n):
             behind[q, p] = before[q, p]
@@ -396,7 +396,7 @@ def step_back(steps, number, drawn, before, bar, found, sums):  # type: ignore[n
     the step's parameters are added to them. ``found``: a buffer of two numbers per ray.
     """
     codes, whole, real, shares, slopes = steps
-    points, first, _, n, _ = drawn
+    points, first, n, _ = drawn
     of_steps, matrices, out_shares, out_slopes, out_points = sums
     code, a, f, own = codes[number], whole[number], real[number], of_steps[number]
     x, y, share = before[0], before[1], before[4]

@@ -211,20 +211,18 @@ class Packet(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """The points of the rays of one pixel in a packet: ray p has the point ``start + p`` of the table.
+    """The points of the rays of a packet.
 
     Args:
         table: see `Points`.
-        start: from the number of a ray in the packet to its point.
-        first: the pixel's first ray in the packet.
-        end: the ray after its last one.
+        start: index in the table of the packet's first ray.
+        rays: number of rays in the packet.
         flipped: (4,) int64, binary digits to flip in the first four columns.
     """
 
     table: NDArray[np.float32]
     start: int
-    first: int
-    end: int
+    rays: int
     flipped: NDArray[np.int64]
 
 
