@@ -318,10 +318,10 @@ class RealLens(TracedLens):
         return 0.0 if far else float(-exit_from_slope / slope_from_slope)
 
     def _widest_seen(self, distance: float, seen: Seen) -> float | None:
-        """At most so far from the axis, light for the sensor meets a plane behind the lens, metres.
+        """A bound of the distance from the axis at which light for the sensor meets a plane behind the lens, metres.
 
-        The distance is that of a class of sensors, of which each is at most `PUPIL_STEP` larger or farther away
-        than another: it is computed once for all of them.
+        It is the largest distance for all sensors that are up to `PUPIL_STEP` larger or farther away than one of
+        them, and is computed once for these.
 
         None if the plane is imaged on the sensor, or if no light reaches it.
 
