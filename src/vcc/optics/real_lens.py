@@ -318,7 +318,7 @@ class RealLens(TracedLens):
         return 0.0 if far else float(-exit_from_slope / slope_from_slope)
 
     def _widest_seen(self, distance: float, seen: Seen) -> float | None:
-        """A bound of the distance from the axis at which light for the sensor meets a plane behind the lens, metres.
+        """A bound of the distance from the axis at which light for the sensor meets a plane behind the lens, m.
 
         It is the largest distance for all sensors that are up to `PUPIL_STEP` larger or farther away than one of
         them, and is computed once for these.
