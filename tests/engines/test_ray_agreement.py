@@ -169,6 +169,14 @@ def test_every_step(name):
     assert_engines_agree(camera(name), field(samples()))
 
 
+@pytest.mark.parametrize("rays", [2, 512])
+@pytest.mark.parametrize("name", ["cells, square", "real lens"])
+def test_few_rays_and_many(name, rays):
+    # The compiled loops trace many pixels together, or one in several parts.
+    cam = vcc.Camera([LENS, *ELEMENTS[name]], vcc.Sensor(D, (35, 34), D * 2e-3 * 0.6))
+    assert_engines_agree(cam, field(samples((*SHAPE, 3))), samples=rays)
+
+
 @pytest.mark.parametrize("library", list(LIBRARIES))
 @pytest.mark.parametrize("name", ["cells, square", "coded diffuser, mixed"])
 def test_every_library(name, library):
@@ -292,3 +300,16 @@ def test_twice_the_samples_are_the_first_ones_and_as_many_more():
     whole = cam.capture(lf, samples=32)
     assert np.abs(many.values - whole.values).max() < 1e-6 * whole.values.max()
     assert many.sampling_error == pytest.approx(whole.sampling_error, rel=1e-4)
+
+
+def test_an_image_can_be_ended_after_each_row_of_views_that_is_sharpened():
+    told = []
+
+    def progress(done, total):
+        told.append(done)
+        if len(told) == 2:
+            raise KeyError
+
+    with pytest.raises(KeyError):
+        camera("cells, square").capture(field(samples()), progress=progress)
+    assert told == [0, 0]

@@ -12,6 +12,7 @@ from tests.physics.random_tracer import Bench, Plane, Scene, decibels
 from vcc import patterns
 from vcc.glasses import Abbe
 from vcc.optics.prescription import Prescription, Surface
+from vcc.optics.real_lens import Seen, _widest_through
 from vcc.units import mm, nm, um
 
 VIEWS, STEP, SLOPE = 21, 0.6 * mm, 1.5e-3
@@ -218,6 +219,32 @@ def test_rays_go_where_light_passes_and_lose_none_of_it(kind, monkeypatch):
     assert abs(lost) < 3 * noise[4096] / np.sqrt(narrow[4096].size) < 4e-3 * np.mean(narrow[4096])
     if kind != "a mask in the stop":  # its edges are not in the tables
         assert np.std(narrow[64] - narrow[4096]) < noise[64] / 2.5
+
+
+def test_all_light_for_sensors_nearby_passes_a_window_that_is_searched_once():
+    lens = vcc.load_lens("double-gauss-50mm", model="real", wavelength=540 * nm)
+    random, searched = np.random.default_rng(1), []
+    for distance in np.array([60.0, 60.1, 60.2]) * mm:
+        seen = Seen(1.0, distance, (0.0, 0.0), 21.6 * mm)
+        lens = replace(lens, z=lens.z + 1 * mm, transmission=[0.9] * len(lens.prescription.surfaces))
+        flight, disc, _ = lens.window(seen)
+        searched.append(_widest_through.cache_info().misses)
+        radius = disc.pattern.diameter / 2
+        # Brute force: from places on the sensor to places in a wider window, back through all surfaces.
+        way, away = random.uniform(0, 2 * np.pi, (2, 20000)), np.sqrt(random.uniform(size=(2, 20000)))
+        angles = np.stack([np.cos(way), np.sin(way)], axis=-1)
+        at_sensor, at_window = (
+            21.6 * mm * away[0, :, None] * angles[0],
+            1.2 * radius * away[1, :, None] * angles[1],
+        )
+        window = flight.linear[0, 2]
+        slopes = (at_sensor - at_window) / (distance - window)
+        rays = np.concatenate([at_window - window * slopes, slopes], axis=-1)
+        passed = lens.parts()[0].bending.back_through(rays)[1] > 0
+        widest = np.hypot(*at_window[passed].T).max()
+        # Rounded up by 1 % for the class of sensors, and by one to two more; few random rays are near the edge.
+        assert 0.93 * radius < widest <= radius
+    assert searched[0] == searched[1] == searched[2]
 
 
 def test_what_is_wrong_with_a_lens_is_said():

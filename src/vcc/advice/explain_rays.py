@@ -55,7 +55,7 @@ def _pilot(run: Drive, core: Rays) -> _Pilot | None:
         return None
     run.engine.prepared(run.plan.before, whole[:1, :1], run.threads)  # the first run may compile
     start = time.perf_counter()
-    values = run.taken
+    values = run.taken()
     preparing = time.perf_counter() - start
 
     def traced_in(patches: list[Rays]) -> tuple[list[Partial], float]:
@@ -125,7 +125,7 @@ def _memory(run: Drive, core: Rays) -> int:
     """Estimated memory of a run besides the light field and the image, bytes."""
     whole, copied = run.samples.whole(), 0
     if isinstance(whole, np.ndarray):
-        in_parts = not isinstance(run.taken, np.ndarray)
+        in_parts = not isinstance(run.taken(), np.ndarray)
         made_anew = not in_parts and bool(run.plan.before or run.kind != whole.dtype)
         if made_anew or not whole.flags.c_contiguous:
             copied = whole.size * run.kind.itemsize

@@ -7,7 +7,7 @@ instead. The sum is linear in the samples, so its transpose is its adjoint.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,7 +40,11 @@ def run(
 
 
 def prepared(
-    before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
+    before: Sequence[operators.Before],
+    values: Any,
+    threads: int,
+    core: Footprints | Rays | None = None,
+    check: Callable[[], None] | None = None,
 ) -> Any:
     """Samples as a core reads them."""
     for operator in before:

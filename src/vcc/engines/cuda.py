@@ -11,7 +11,7 @@ Importing this module without a GPU raises an error that says what to do.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Any
 
@@ -95,7 +95,11 @@ def back(
 
 
 def prepared(
-    before: Sequence[operators.Before], values: Any, threads: int, core: Footprints | Rays | None = None
+    before: Sequence[operators.Before],
+    values: Any,
+    threads: int,
+    core: Footprints | Rays | None = None,
+    check: Callable[[], None] | None = None,
 ) -> Any:
     """Samples as a core reads them: NumPy arrays by `vcc.engines.numba_cpu`, others by their own library.
 
@@ -103,7 +107,7 @@ def prepared(
         InputError: an operator that is not supported for samples kept by `on_gpu`.
     """
     if isinstance(values, np.ndarray):
-        return numba_cpu.prepared(before, values, threads)
+        return numba_cpu.prepared(before, values, threads, check=check)
     for operator in before:
         if not cuda_arrays.is_of_numba(values):
             values = operator.apply(values)

@@ -126,7 +126,11 @@ def back(
 
 
 def prepared(
-    before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
+    before: Sequence[operators.Before],
+    values: NDArray[Any],
+    threads: int,
+    core: Footprints | Rays | None = None,
+    check: Callable[[], None] | None = None,
 ) -> NDArray[Any] | sharpening_kernels.ToSharpen:
     """Samples as a core reads them. Compiled loops sharpen them, with the same bits as `SharpenViews.apply`.
 
@@ -138,7 +142,7 @@ def prepared(
             return found
     for operator in before:
         if isinstance(operator, operators.SharpenViews):
-            values = sharpening_kernels.filtered(operator.weights, values, threads)
+            values = sharpening_kernels.filtered(operator.weights, values, threads, check)
         else:
             values = operator.apply(values)
     return values

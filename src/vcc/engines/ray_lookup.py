@@ -172,15 +172,14 @@ def add_view(samples, base, k, l, weight, found):  # type: ignore[no-untyped-def
 
 @ray_inlined
 def add_rays(field, begin, rays, n, second, sums):  # type: ignore[no-untyped-def]
-    """Look up a packet of n rays in the light field and add the results to sums (half, `LANES` or channels).
+    """Look up n rays of a packet in the light field and add the results to sums (half, `LANES` or channels).
 
-    Rays from ``second`` on belong to the second half. Positions are replaced by indices.
+    The packet holds indices, from `to_indices`. Rays from ``second`` on belong to the second half.
     """
-    samples, _, index_from_ray, motion, between = field
+    samples, _, _, motion, between = field
     values, (nv, nu, high, wide), channels = samples
     first_rows, first_columns, nt, ns = begin
     x, y, s, t, share = rays
-    to_indices(index_from_ray, rays, n)
     # If x and y are separable, the pixels read in four views are two columns and two rows.
     parted = between and motion[0, 1] == 0.0 and motion[1, 0] == 0.0 and nu > 1 and nv > 1
     vectors = parted and (channels == 1 or channels == 3 or channels == 4)

@@ -1,9 +1,10 @@
 """The compiled loops over pixels, packets and tiles that trace rays; see `vcc.engines.ray_tables`.
 
 One loop serves every camera: the steps of a ray are a list of numbers, `vcc.engines.ray_steps`. A packet holds
-the rays of one pixel. Its stages are separate functions, compiled once for all loops and all types of samples:
-inlined in each loop, they took three times as long to compile. Python allocates the arrays that loops work in: a
-wrapper kernel that did so was optimised with the whole loop in it a second time.
+the rays of one pixel, or of several neighbours that have few rays each. Its stages are separate functions,
+compiled once for all loops and all types of samples: inlined in each loop, they took three times as long to
+compile. Python allocates the arrays that loops work in: a wrapper kernel that did so was optimised with the
+whole loop in it a second time.
 
 `add_pixels` sums the samples that the rays of each pixel read. The transpose to samples has two stages, because
 rays of neighbouring pixels read the same samples. `find_tile` traces the rays and sorts them by the view that
@@ -17,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcc.engines.compiled import ray_back, ray_back_inlined, ray_inlined, ray_loop
+from vcc.engines.compiled import ray_back, ray_back_inlined, ray_inlined, ray_inner, ray_loop
 from vcc.engines.ray_aims import (
     aim_rays,
     at_pixel,
@@ -45,20 +46,72 @@ from vcc.engines.ray_lookup import (
     weights_in_four_views,
 )
 from vcc.engines.ray_steps import moved_back, packet_of, step_back, step_on, take_few_steps, take_steps
-from vcc.engines.ray_tables import Drawn
+from vcc.engines.ray_tables import Drawn, Packet
 from vcc.engines.vector_gather import spread_views_of_1, spread_views_of_3, spread_views_of_4
-from vcc.plan.rays.points import DIGITS
+from vcc.plan.rays.points import DIGITS, FIRST_COLUMNS
 
 PACKET = 256
 """Rays of a packet: their six numbers each stay in the first-level cache."""
+TOGETHER = 64
+"""Rays up to which pixels share a packet: loops over fewer do not pay for their start."""
+
+
+@ray_inlined
+def part_of(rays, first, n):  # type: ignore[no-untyped-def]
+    """n rays of a packet. Loops that begin at 0 need no check for places before the array, so they vectorise."""
+    end = first + n
+    return Packet(
+        rays.x[first:end], rays.y[first:end], rays.s[first:end], rays.t[first:end], rays.share[first:end]
+    )
+
+
+@ray_inner
+def add_packet(field, begin, steps, few, rare, drawn, rays, owners, pictures, sums):  # type: ignore[no-untyped-def]
+    """Take a packet of rays through the steps, and add the samples that they read to the pixels of the packet.
+
+    Args:
+        field: as for `add_pixels`, like the other arguments that are not listed here.
+        drawn: all rays of the packet; scattering steps read its points, and then it is of one pixel.
+        rays: of the pixels in ``owners``, one after the other, equally many each.
+        owners: (pixels, 4): number, row and column of a pixel, and which of its rays begins the second half.
+    """
+    samples = field.samples
+    channels, (sums, totals, tally, _) = samples.channels, sums
+    if few is not None:
+        take_few_steps(steps, drawn, rays)
+    if rare is not None:
+        take_steps(steps, drawn, rays)
+    to_indices(field.index_from_ray, rays, drawn.rays)
+    n = drawn.rays // len(owners)
+    factor = field.scale / tally[2]
+    # Vector code keeps left and right pixels of the samples in separate lanes: add them.
+    apart = channels == 1 or channels == 3 or channels == 4
+    for number in range(len(owners)):
+        pixel = owners[number, 0]
+        if pixel != tally[1]:  # else the pixel has rays in the packet before this one, or through another cell
+            totals[:] = 0
+            tally[1] = pixel
+        add_rays(field, begin, part_of(rays, number * n, n), n, owners[number, 3], sums)
+        row, column = owners[number, 1], owners[number, 2]
+        for half in range(2):  # single precision within a packet, double across packets
+            for lane in range(sums.shape[1]):
+                totals[half, lane] += sums[half, lane]
+                sums[half, lane] = 0
+        for channel in range(channels):
+            one, two = totals[0, channel], totals[1, channel]
+            if apart:
+                one, two = one + totals[0, channels + channel], two + totals[1, channels + channel]
+            one, two = one * factor, two * factor
+            pictures[0, row, column, channel] = one + two
+            pictures[1, row, column, channel] = 2 * (one - two)
 
 
 @ray_loop
 def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, ended, pictures, tile, within, sums):  # type: ignore[no-untyped-def]
     """Trace the pixels of a tile into pictures (2, rows, columns, channels); arguments: `vcc.engines.ray_tables`.
 
-    The first picture is the sum over all rays of a pixel, the second the difference of the two halves. The
-    kernel returns once ``ended[0]`` is true (cancelled).
+    The first picture is the sum over all rays of a pixel, the second the difference of the two halves; both are
+    zero before. The kernel returns once ``ended[0]`` is true (cancelled).
 
     Args:
         field: whole views, or parts of them.
@@ -69,61 +122,55 @@ def add_pixels(field, begin, sensor, points, window, cells, steps, few, rare, en
         few: True if all steps are in `FEW`, else None.
         rare: None if all steps are in `FEW`, else True.
         within: as returned by `vcc.engines.rays_compiled.working_arrays`.
-        sums: of a packet, float32, and of a pixel, (2, lanes) each; and the number of traced rays, (1,).
+        sums: of a pixel in a packet, float32, and of a pixel, (2, lanes) each; (3,): the number of traced rays,
+            the pixel of the second sum, and the rays of a pixel; the pixels of a packet, see `add_packet`.
     """
     table, samples, _, seed = points
-    channels = field.samples.channels
     rays, near, images, flipped = within
-    share = rays.share
-    sums, totals, tally = sums
+    tally, owners = sums[2], sums[3]
+    tally[1], tally[2] = -1, samples
+    n = min(PACKET, samples)
+    most = max(TOGETHER // n, 1) if len(table) == FIRST_COLUMNS else 1  # diffusers have further columns
+    filled = 0
     for row in range(tile.first_row, min(tile.end_row, sensor.rows)):
         for column in range(tile.first_column, min(tile.end_column, sensor.columns)):
             if ended[0]:
                 return
             pixel, middle = row * sensor.columns + column, middle_of(sensor, row, column)
             first = first_point(points, pixel)
-            totals[:] = 0
             seen = 1
             if cells is not None:
                 seen = cells_at(True, cells, middle, sensor.sensitive, near)
             for q in range(seen):
                 if window is not None:
-                    for number in range(4):
-                        flipped[number] = hashed(pixel, seed + 1 + number) >> np.uint32(32 - DIGITS)
+                    for digit in range(4):
+                        flipped[digit] = hashed(pixel, seed + 1 + digit) >> np.uint32(32 - DIGITS)
                 if cells is not None:
                     turn_to(True, cells, seed, pixel, near, q, images, flipped)
                 for done in range(0, samples, PACKET):
-                    n = min(PACKET, samples - done)
-                    drawn = Drawn(table, first + done, n, flipped)
-                    at_pixel(drawn, middle, sensor.sensitive, rays)
+                    at = filled * n
+                    drawn, own = Drawn(table, first + done, n, flipped), part_of(rays, at, n)
+                    at_pixel(drawn, middle, sensor.sensitive, own)
                     if window is not None:
-                        through_window(drawn, window, rays)
+                        through_window(drawn, window, own)
                     if cells is not None:
-                        through_cell(drawn, images, cells, rays)
+                        through_cell(drawn, images, cells, own)
                     sent = 0
                     for p in range(n):
-                        sent += share[p] > 0.0
+                        sent += own.share[p] > 0.0
                     if sent == 0:
                         continue
                     tally[0] += sent
-                    if few is not None:
-                        take_few_steps(steps, drawn, rays)
-                    if rare is not None:
-                        take_steps(steps, drawn, rays)
-                    add_rays(field, begin, rays, n, samples // 2 - done, sums)
-                    for half in range(2):  # single precision within a packet, double across packets
-                        for lane in range(sums.shape[1]):
-                            totals[half, lane] += sums[half, lane]
-                            sums[half, lane] = 0
-            # Vector code keeps left and right pixels of the samples in separate lanes: add them.
-            apart = channels == 1 or channels == 3 or channels == 4
-            for channel in range(channels):
-                one, two = totals[0, channel], totals[1, channel]
-                if apart:
-                    one, two = one + totals[0, channels + channel], two + totals[1, channels + channel]
-                one, two = one * field.scale / samples, two * field.scale / samples
-                pictures[0, row, column, channel] = one + two
-                pictures[1, row, column, channel] = 2 * (one - two)
+                    owner = owners[filled]
+                    owner[0], owner[1], owner[2], owner[3] = pixel, row, column, samples // 2 - done
+                    filled += 1
+                    if filled == most:
+                        packet = Drawn(table, first + done, at + n, flipped)
+                        add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
+                        filled = 0
+    if filled > 0:
+        packet = Drawn(table, 0, filled * n, flipped)
+        add_packet(field, begin, steps, few, rare, packet, rays, owners[:filled], pictures, sums)
 
 
 # --- back to samples ---

@@ -26,6 +26,8 @@ from vcc.plan.rays.model import Rays
 
 TILE = 32
 """Side, in pixels, of the tile that a thread works on: the samples that the tile reads stay in the cache."""
+FEW_RAYS = 8
+"""Rays a pixel up to which tiles are twice as large, so that handing them to threads costs less."""
 
 _NOWHERE = (0.0, 0.0)
 ALL_VISIBLE = np.zeros((0, 0)), _NOWHERE, 0.0
@@ -61,7 +63,7 @@ def traced(
     channels = values.shape[4] if len(values.shape) == 5 else 1
     rows, columns = core.raster_shape
     pictures = np.zeros((2, rows, columns, channels), dtype=np.float32)
-    tile = TILE if patches is None else patches.tile
+    tile = patches.tile if patches is not None else TILE if core.samples > FEW_RAYS else 2 * TILE
     lit = rows_that_look(core, tile)
     tiles = [tables.Tile(r, r + tile, c, c + tile) for r in lit for c in range(0, columns, tile)]
     dark = rows - sum(min(tile, rows - r) for r in lit)
@@ -103,8 +105,9 @@ def _tile_of_parts(
 def _tile(*given: Any) -> int:
     """Trace the pixels of a tile with `kernels.add_pixels`, in new buffers; return the number of traced rays."""
     lanes = max(given[0].samples.channels, LANES)
-    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(1, dtype=np.int64)
-    kernels.add_pixels(*given, working_arrays(), sums)
+    sums = np.zeros((2, lanes), dtype=np.float32), np.zeros((2, lanes)), np.zeros(3, dtype=np.int64)
+    owners = np.empty((kernels.TOGETHER, 4), dtype=np.int64)
+    kernels.add_pixels(*given, working_arrays(), (*sums, owners))
     return int(sums[2][0])
 
 

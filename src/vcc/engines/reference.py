@@ -8,7 +8,7 @@ x(q) + shear · (y − y(q)). The shares of a sample then still sum to one along
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Any
 
@@ -87,7 +87,11 @@ def footprints(core: Footprints, values: NDArray[Any], progress: Progress | None
 
 
 def prepared(
-    before: Sequence[operators.Before], values: NDArray[Any], threads: int, core: Footprints | Rays | None = None
+    before: Sequence[operators.Before],
+    values: NDArray[Any],
+    threads: int,
+    core: Footprints | Rays | None = None,
+    check: Callable[[], None] | None = None,
 ) -> NDArray[Any]:
     """Samples as a core reads them, filtered in double precision; samples of 8 bits are sharpened exactly."""
     for operator in before:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,16 @@ AT_ONCE = 32
 """Numbers that vectorised loops process at a time: multiples of it leave no remainder loop."""
 
 
-def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int | None = None) -> NDArray[Any]:
-    """Filter samples (v, u, t, s[, channels]): uint8 gives int16, float64 stays, all others give float32."""
+def filtered(
+    weights: tuple[int, int, int],
+    values: NDArray[Any],
+    threads: int | None = None,
+    check: Callable[[], None] | None = None,
+) -> NDArray[Any]:
+    """Filter samples (v, u, t, s[, channels]): uint8 gives int16, float64 stays, all others give float32.
+
+    ``check`` is called after each row of views; an exception that it raises ends the work.
+    """
     given, wide = _kinds(values.dtype)
     kept = np.empty(values.shape, dtype=wide)
     factors, whole = _factors(weights, values.dtype)
@@ -39,7 +48,9 @@ def filtered(weights: tuple[int, int, int], values: NDArray[Any], threads: int |
             sharpen(view, None, corner, (rows, length // channels), to, channels, factors, whole, line)
 
     with Workers(threads or cores()) as pool:
-        list(pool.map(sharpen_row, range(values.shape[0])))
+        for _ in pool.map(sharpen_row, range(values.shape[0])):
+            if check is not None:
+                check()
     return kept
 
 

@@ -8,6 +8,7 @@ bends rays, and then an affine map; plans trace the surfaces themselves.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.values import Value
 from vcc.optics.ray_map import RayMap
-from vcc.optics.refraction import Refraction, traced
+from vcc.optics.refraction import Refraction, traced, traced_on
 
 Array = NDArray[np.float64]
 
@@ -94,15 +95,10 @@ class Aberrations(Value):
             basis: (4, 4).
             loose: (4, any number).
         """
-        from scipy.stats import qmc  # slow to import
-
         columns = np.concatenate([basis, loose], axis=1)
-        drawn = qmc.Sobol(columns.shape[1], seed=0).random_base2(RAYS) * 2 - 1
-        inner = 1 << (RAYS - 1)
-        drawn[inner:] /= np.abs(drawn[inner:]).max(axis=1, keepdims=True)  # half of them on the border
-        rays = middle + drawn @ columns.T
-        found, share = self.back_through(self.first_order(rays))
-        away = np.abs(found - rays)[share > 0]
+        rays = middle + _drawn(columns.shape[1]) @ columns.T
+        found, passed = traced_on(self.back, self.first_order(rays))
+        away = np.abs(_flown(found, self.beginning) - rays[passed])
         x, y, s, t = (MARGIN * away.max(axis=0)).tolist() if len(away) else (0.0,) * 4
         return x, y, s, t
 
@@ -110,6 +106,18 @@ class Aberrations(Value):
     @cached
     def _inverse(self) -> Affine:
         return self.first_order.inverse()
+
+
+@lru_cache(maxsize=8)
+def _drawn(columns: int) -> Array:
+    """Evenly spread points of a cube from −1 to 1, half of them on its border, (2^`RAYS`, columns)."""
+    from scipy.stats import qmc  # slow to import
+
+    drawn = np.asarray(qmc.Sobol(columns, seed=0).random_base2(RAYS) * 2 - 1)
+    inner = 1 << (RAYS - 1)
+    drawn[inner:] /= np.abs(drawn[inner:]).max(axis=1, keepdims=True)
+    drawn.flags.writeable = False
+    return drawn
 
 
 def _cosine_fourth(rays: Array) -> Array:

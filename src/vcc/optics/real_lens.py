@@ -6,6 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, get_args
 
 import numpy as np
@@ -21,7 +22,7 @@ from vcc.optics.band import Band
 from vcc.optics.faces import Element, Faces, Part, Way
 from vcc.optics.first_order import FirstOrder
 from vcc.optics.prescription import Prescription, Reference, Surface
-from vcc.optics.refraction import Refraction, traced
+from vcc.optics.refraction import Refraction, traced, traced_on
 from vcc.optics.visible_pupil import Passes, tables_of
 from vcc.shapes.patterns import Circle, Pattern
 
@@ -31,6 +32,8 @@ RADIOMETRIES = ("exact", "paraxial")
 """How the irradiance behind a lens counts: by angles (cos⁴θ), or by slopes."""
 PUPIL_STEP = 0.01
 """Radii of exit windows are rounded up to powers of 1 plus this, and stay while a lens changes a little."""
+NO_GAIN = 1e-9
+"""Metres by which a slope moves light on the sensor; below it, a plane behind the lens is imaged there."""
 FARTHEST = 100.0
 """An exit pupil farther away than this many lengths of the lens is replaced by the plane behind the lens."""
 
@@ -315,7 +318,10 @@ class RealLens(TracedLens):
         return 0.0 if far else float(-exit_from_slope / slope_from_slope)
 
     def _widest_seen(self, distance: float, seen: Seen) -> float | None:
-        """The largest distance from the axis at which light for the sensor meets a plane behind the lens, metres.
+        """A bound of the distance from the axis at which light for the sensor meets a plane behind the lens, m.
+
+        It is the largest distance for all sensors that are up to `PUPIL_STEP` larger or farther away than one of
+        them, and is computed once for these.
 
         None if the plane is imaged on the sensor, or if no light reaches it.
 
@@ -323,39 +329,24 @@ class RealLens(TracedLens):
             distance: of the plane, from the end of the element, metres.
             seen: how the sensor sees the end.
         """
-        passes = self._passes(distance, seen)
-        if passes is None:
+        gain = seen.gain(distance)
+        if abs(gain) < NO_GAIN:
             return None
+        nearest = math.copysign(_power_of_step(abs(gain), math.floor), gain)
+        radius = _power_of_step(seen.radius, math.ceil)
+        return _widest_through(self._alone, distance, seen.from_place, nearest, radius)
 
-        def met(points: Array) -> Array:
-            """How far out points (p, q, angle) are; -1 if light does not pass."""
-            p, q, angle = points.T
-            lit = passes(np.stack([p, q * np.cos(angle), q * np.sin(angle)], axis=-1))
-            return np.where(lit, q, -1.0)
+    @property
+    def _alone(self) -> RealLens:
+        """The lens without all that does not change which rays pass: equal for lenses that pass the same rays."""
+        mask = None if self.mask is None else Circle(max(self._mask_size()))
+        return replace(self, z=0.0, decentre=(0.0, 0.0), name="", mask=mask, transmission=1.0)
 
-        reach = 2 * self._stop_radius
-        for _ in range(6):
-            p, q, angle = np.meshgrid(
-                np.linspace(0, seen.radius, 7), np.linspace(0, reach, 41), np.linspace(0, np.pi, 13), indexing="ij"
-            )
-            points = np.stack([p.ravel(), q.ravel(), angle.ravel()], axis=-1)
-            widest = float(met(points).max())
-            if widest < 0.8 * reach:
-                break
-            reach *= 2
-        if widest <= 0:
-            return None
-        return _refined(points, met, np.array([seen.radius / 6, reach / 40, np.pi / 12]))
-
-    def _passes(self, distance: float, seen: Seen) -> Passes | None:
+    def _passes(self, distance: float, from_place: float, gain: float) -> Passes:
         """Whether light for places p on the sensor passes places (a, b) in a plane, all in metres; see `Passes`.
 
-        None if the plane is imaged on the sensor. ``a`` is along the direction of p.
+        ``a`` is along the direction of p. A ray (q, s) in the plane meets the sensor at from_place·q + gain·s.
         """
-        # A place p on the sensor and a place q in the plane: p = A·x + B·s, q = x + distance·s.
-        gain = seen.from_slope - distance * seen.from_place
-        if abs(gain) < 1e-9:
-            return None
         back = list(_reversed(self.onward))
         back[0] = replace(back[0], distance=-self._behind)
         if self.mask is not None:  # no farther out than its corners
@@ -366,13 +357,15 @@ class RealLens(TracedLens):
         def passes(points: Array) -> NDArray[np.bool_]:
             place = points[:, 1:]
             image = np.stack([points[:, 0], np.zeros(len(points))], axis=-1)
-            slope = (image - seen.from_place * place) / gain
+            slope = (image - from_place * place) / gain
             rays = np.concatenate([place - distance * slope, slope], axis=-1)
-            return np.asarray(traced(surfaces, rays)[1] > 0)
+            passed = np.zeros(len(rays), dtype=np.bool_)
+            passed[traced_on(surfaces, rays)[1]] = True
+            return passed
 
         return passes
 
-    def visible_pupil(self, seen: Seen, radius: float) -> Array | None:
+    def visible_pupil(self, seen: Seen, radius: float, check: Callable[[], None] = lambda: None) -> Array | None:
         """The part of the disc of `window` that places on the sensor see, as `vcc.optics.visible_pupil.tables_of`.
 
         None for soft edges, which gradients need: then the part changes with the lens, and tables of it would too.
@@ -380,12 +373,24 @@ class RealLens(TracedLens):
         Args:
             seen: how the sensor sees the end of the lens.
             radius: of the disc, metres.
+            check: called every few milliseconds; an exception that it raises ends the computation.
         """
-        passes = self._passes(self._pupil_distance, seen)
-        if self.softness > 0 or passes is None:
+        distance = self._pupil_distance
+        gain = seen.gain(distance)
+        if self.softness > 0 or abs(gain) < NO_GAIN:
             return None
+        passes = self._passes(distance, seen.from_place, gain)
         unit = np.array([1.0, radius, radius])
-        return tables_of(lambda points: passes(points * unit), seen.radius)
+
+        def seen_from(points: Array) -> NDArray[np.bool_]:
+            check()
+            return passes(points * unit)
+
+        return tables_of(seen_from, seen.radius)
+
+    def visible_nearby(self, seen: Seen, radius: float) -> Array | None:
+        """As `visible_pupil`, for all sensors of which `Seen.rounded` is the same: computed once for them."""
+        return _visible_through(self._alone, seen.rounded(), radius)
 
     def _widest(self, distance: float) -> float:
         """As `_widest_seen`, for light that goes anywhere: rays from all over the stop in all directions."""
@@ -409,9 +414,10 @@ class RealLens(TracedLens):
             np.linspace(0, wide, 13), np.linspace(-2, 2, 81), np.linspace(0, 2, 25), indexing="ij"
         )
         rays = np.stack([r.ravel(), s.ravel(), t.ravel()], axis=-1)
-        if met(rays).max() <= 0:
+        away = met(rays)
+        if away.max() <= 0:
             raise InputError(f"no light passes {self.label}: its rims stop all rays from its stop")
-        return _refined(rays, met, np.array([wide / 12, 0.05, 0.083]))
+        return _refined(rays, away, met, np.array([wide / 12, 0.05, 0.083]))
 
     @property
     def _stop_radius(self) -> float:
@@ -480,10 +486,63 @@ class Seen:
     axis: tuple[float, float]
     radius: float
 
+    def gain(self, distance: float) -> float:
+        """From slopes to places on the sensor, for rays from a place ``distance`` behind the end, metres."""
+        return self.from_slope - distance * self.from_place
 
-def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float:
-    """The largest value of a function around the points of a grid where it is large, by repeated random steps."""
-    draw, away = np.random.default_rng(0), met(points)
+    def rounded(self) -> Seen:
+        """From the nearest of distances 1 % apart: at half of this, a double Gauss loses 0.05 % of its light."""
+        steps = round(100 * math.log(max(abs(self.from_slope), 1e-9)))
+        return replace(self, from_slope=math.copysign(math.exp(steps / 100), self.from_slope))
+
+
+@lru_cache(maxsize=64)
+def _widest_through(
+    lens: RealLens, distance: float, from_place: float, gain: float, radius: float
+) -> float | None:
+    """See `RealLens._widest_seen`: for sensors of up to this radius, from this gain to `PUPIL_STEP` above it."""
+    passes = lens._passes(distance, from_place, gain)
+    # A ray that meets a sensor of the class at p meets the sensor with the least gain at most so far beside p.
+    beside = PUPIL_STEP * abs(from_place)
+
+    def met(points: Array) -> Array:
+        """How far out points (share of the way to the farthest p, q, angle) are; -1 if light does not pass."""
+        share, q, angle = points.T
+        p = share * (radius + beside * q)
+        return np.where(passes(np.stack([p, q * np.cos(angle), q * np.sin(angle)], axis=-1)), q, -1.0)
+
+    reach = 2 * lens._stop_radius
+    for _ in range(6):
+        share, q, angle = np.meshgrid(
+            np.linspace(0, 1, 7), np.linspace(0, reach, 41), np.linspace(0, np.pi, 13), indexing="ij"
+        )
+        points = np.stack([share.ravel(), q.ravel(), angle.ravel()], axis=-1)
+        away = met(points)
+        widest = float(away.max())
+        if widest < 0.8 * reach:
+            break
+        reach *= 2
+    if widest <= 0:
+        return None
+    return _refined(points, away, met, np.array([1 / 6, reach / 40, np.pi / 12]))
+
+
+@lru_cache(maxsize=64)
+def _visible_through(lens: RealLens, seen: Seen, radius: float) -> Array | None:
+    """See `RealLens.visible_nearby`."""
+    return lens.visible_pupil(seen, radius)
+
+
+def _refined(points: Array, away: Array, met: Callable[[Array], Array], step: Array) -> float:
+    """The largest value of a function around the points of a grid where it is large, by repeated random steps.
+
+    Args:
+        points: of the grid.
+        away: the function's values there.
+        met: the function.
+        step: largest first steps.
+    """
+    draw = np.random.default_rng(0)
     for _ in range(7):
         best = np.argsort(away)[-24:]
         points, away = points[best], away[best]
@@ -494,7 +553,12 @@ def _refined(points: Array, met: Callable[[Array], Array], step: Array) -> float
 
 def _rounded_up(radius: float) -> float:
     """A power of 1 + PUPIL_STEP, one to two steps above a radius that random rays found, metres."""
-    return float((1 + PUPIL_STEP) ** math.ceil(math.log(radius) / math.log1p(PUPIL_STEP) + 1))
+    return _power_of_step(radius, math.ceil) * (1 + PUPIL_STEP)
+
+
+def _power_of_step(number: float, rounded: Callable[[float], int]) -> float:
+    """The power of 1 + PUPIL_STEP next to a number above 0, below it or above it."""
+    return float((1 + PUPIL_STEP) ** rounded(math.log(number) / math.log1p(PUPIL_STEP)))
 
 
 def _is_empty(surface: Surface, before: float) -> bool:

@@ -162,3 +162,19 @@ def traced(surfaces: tuple[Any, ...], rays: Array) -> tuple[Array, Array]:
         x, y, s, t, share = surface.refracted(x, y, s, t)
         total = total * share
     return np.stack([x, y, s, t], axis=-1), total
+
+
+def traced_on(surfaces: tuple[Any, ...], rays: Array) -> tuple[Array, NDArray[np.int64]]:
+    """As `traced`, but rays that are stopped are not traced further.
+
+    Returns:
+        The rays that pass, behind the surfaces, and their numbers among the rays (n, 4).
+    """
+    left = np.arange(len(rays))
+    x, y, s, t = rays.T
+    for surface in surfaces:
+        x, y, s, t, share = surface.refracted(x, y, s, t)
+        on = share > 0
+        if not on.all():
+            x, y, s, t, left = x[on], y[on], s[on], t[on], left[on]
+    return np.stack([x, y, s, t], axis=-1), left

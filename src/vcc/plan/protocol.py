@@ -193,7 +193,14 @@ class Engine(Protocol):
         """
         ...
 
-    def prepared(self, before: Sequence[Any], values: Any, threads: int, core: Any = None) -> Any:
+    def prepared(
+        self,
+        before: Sequence[Any],
+        values: Any,
+        threads: int,
+        core: Any = None,
+        check: Callable[[], None] | None = None,
+    ) -> Any:
         """Samples (v, u, t, s[, channels]) in the form that a core reads, after all operators before it.
 
         Args:
@@ -202,6 +209,7 @@ class Engine(Protocol):
             threads: number of concurrent threads.
             core: if given, the result is for `run` of this core alone, which may prepare samples lazily; then
                 only ``shape`` of the result may be read.
+            check: may be called between pieces of the work; an exception that it raises ends the work.
         """
         ...
 

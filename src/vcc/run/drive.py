@@ -23,7 +23,7 @@ from vcc.base import lazy_import
 from vcc.base.cached import cached, is_computed, preset
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError, warn_of_result
-from vcc.base.progress import Progress
+from vcc.base.progress import Progress, tell
 from vcc.base.workers import Workers
 from vcc.engines import abilities, chosen, engine
 from vcc.fields.grid import Block
@@ -145,6 +145,7 @@ class Drive:
         self.radiance = self.unit / self.samples.grid.full_scale
         self.core = plan.core.scaled(self.radiance)
         self._kept: NDArray[Any] | None = None
+        self._lazy: Any = None
 
     @classmethod
     def of_linear(cls, plan: Plan, samples: Samples, how: How, executor: Any = None) -> Drive:
@@ -287,7 +288,7 @@ class Drive:
         """
         listed = list(blocks)
         if self.in_memory and len(listed) == 1:
-            return self._run(self._with_rays(beside), self.taken, beside, progress)
+            return self._run(self._with_rays(beside), self.taken(progress), beside, progress)
         if self.worker_pool is None:
             return over_blocks([self], listed, beside, progress)[0]
         return self._by_others(listed, beside, progress)
@@ -299,18 +300,20 @@ class Drive:
     def _run(self, core: Any, values: Any, beside: int, progress: Progress | None = None) -> Partial:
         return self.engine.run(core, values, beside=int(beside > 0), threads=self.threads, progress=progress)
 
-    @property
-    @cached
-    def taken(self) -> Any:
+    def taken(self, progress: Progress | None = None) -> Any:
         """The input of the core if all samples are in memory: `prepared`, which may exist already, or the samples
-        that the engine prepares for this core's rays alone."""
-        if self.plan.by_rays and not is_computed(self, "prepared"):
-            whole = self.samples.whole()
-            found = self.engine.prepared(self.plan.before, whole, self.threads, self.core)
-            if not isinstance(found, type(whole)):
-                return found
-            preset(self, prepared=found)
-        return self.prepared
+        that the engine prepares for this core's rays alone; both are kept for further rounds.
+
+        ``progress`` is called with (0, 1) meanwhile.
+        """
+        if self.plan.by_rays and self._lazy is None and not is_computed(self, "prepared"):
+            whole, check = self.samples.whole(), partial(tell, progress, 0, 1)
+            found = self.engine.prepared(self.plan.before, whole, self.threads, self.core, check)
+            if isinstance(found, type(whole)):
+                preset(self, prepared=found)
+            else:
+                self._lazy = found
+        return self.prepared if self._lazy is None else self._lazy
 
     @property
     @cached

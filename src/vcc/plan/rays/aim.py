@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
+from vcc.base.values import content
 from vcc.optics.deflections import CellDeflection, FacetDeflection
 from vcc.plan.following import check_unchanged, choice, plan_again
 from vcc.plan.rays.bounds import cell_windows
@@ -266,14 +267,17 @@ def settled(path: Path, everything: bool, windows_only: bool = False) -> Aimed:
         InputError: nothing bounds the rays.
     """
     deflections, before = DeflectionBounds.none(path), math.inf
+    last: Aimed | None = None
     if _strays_alike(path):
         _, deflections = regions_and_deflections(path, NOWHERE)
     for _ in range(ROUNDS):
         aim = smallest(path, deflections, everything, windows_only)
+        if last is not None and content(aim) == content(last.aim):
+            return last  # with the same deflections
         regions, further = regions_and_deflections(path, aim)
         if further.same(deflections) and deflections.size <= UNBOUNDED:
             return Aimed(aim, regions, deflections, everything)  # another iteration would find the same
-        deflections = further
+        deflections, last = further, Aimed(aim, regions, further, everything)
         if abs(deflections.size - before) <= SETTLED * before < math.inf:
             break
         if deflections.size > UNBOUNDED:

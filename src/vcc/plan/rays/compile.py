@@ -436,12 +436,11 @@ def _at_what_is_visible(path: Path, aim: Aim, parts: Parts) -> Aim:
             seen, disc = train.seen_from_sensor(lens), leg.stage.faces.pattern
             if seen is None or not _is_aimed_at(aim, leg) or not isinstance(disc, Circle):
                 return aim
-            made = partial(lens.visible_pupil, seen, disc.diameter / 2)
             if parts.draft is None:
+                made = partial(lens.visible_pupil, seen, disc.diameter / 2, parts.check)
                 table = parts.part("visible pupil", partial(content, (lens, seen, disc.diameter)), made)
-            else:  # of a sensor nearby: one that is 1 % further loses 0.5 % of the light of a double Gauss
-                nearby = replace(lens, z=0.0), round(100 * math.log(max(abs(seen.from_slope), 1e-9)))
-                table = parts.decision("visible pupil", nearby, made)
+            else:
+                table = lens.visible_nearby(seen, disc.diameter / 2)
             if table is None:
                 return aim
             assert isinstance(aim, Window)
