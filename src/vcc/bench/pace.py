@@ -110,7 +110,7 @@ class Pace:
         return self._kept[of][1][WHOLE].recent if of in self._kept and WHOLE in self._kept[of][1] else None
 
     def fineness(self, of: Hashable) -> Fineness:
-        """The fineness of the next image; without measurements, a coarse one: as of the newest kind, or the finest."""
+        """The fineness of the next image; without measurements, coarse: as of the newest kind, or the finest."""
         if of not in self._kept:
             newest = next(reversed(self._kept), None)
             found = WHOLE if newest is None else self.fineness(newest)
