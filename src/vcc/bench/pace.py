@@ -24,8 +24,8 @@ LEFT = 0.4
 TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
 WORTH = 1.5
-"""A coarse image is tried again if its shortest time, by how busy the machine is, is at most this times the limit;
-a whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
+"""A coarse image is tried again if its shortest time, by how busy the machine is, is at most the limit, or this times
+`IN_TIME`; a whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
 MOST_KINDS = 50
@@ -131,7 +131,7 @@ class Pace:
         every = self._kept[of][1]
         times = every.get(fineness)
         newest = max(every.values(), key=lambda each: each.at)
-        most = limit if fineness == WHOLE else WORTH * limit
+        most = limit if fineness == WHOLE else max(limit, WORTH * IN_TIME)
         if times is None or times.least * newest.recent / newest.least > most:
             return False
         return self._clock() - times.at >= max(LEFT, (times.recent - limit) / TRIALS)
