@@ -1,7 +1,7 @@
-"""The error that plans report for masks in mid-path, far out of focus, where the light field ends within the image.
+"""The error that plans report for masks in mid-path, far out of focus, where views' images end on the sensor.
 
-Oracle: rays in NumPy from points of pixels through points of the lens, to masks and the light field's borders, whose
-own error is known from two halves. The light is uniform: what differs is shadows of masks and of the borders.
+Oracle: rays in NumPy from points of pixels through points of the lens, to masks and the light field's borders; two
+halves give its own error. The light is uniform: only shadows of masks and of the borders differ.
 """
 
 from __future__ import annotations

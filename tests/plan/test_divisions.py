@@ -192,7 +192,7 @@ def test_images_of_views_end_at_their_outermost_samples():
 
 
 def test_cells_that_a_mask_cuts_are_divided_for_what_would_fall_beside():
-    """An error of 0.072 falls as parts, to the power 1.5 if parts lose as their width, as of edges: to 0.009 in four."""
+    """An error of 0.072 falls as parts, and as parts to the power 1.5 at edges: to 0.009 in four."""
 
     def edges(lost):
         return Told(lambda added: lost * added[0])

@@ -95,15 +95,15 @@ class WavesOfPoint(Brief):
         if max(counts) <= most:
             return parts
         way_out = (
-            f"pass shape=({min(counts[0], most)}, {min(counts[1], most)}) or smaller, the part around the image of "
-            "the point"
+            f"pass shape=({min(counts[0], most)}, {min(counts[1], most)}) or smaller, the part around the point's "
+            "image"
             if most > 0
             else f"pass pitch={LARGEST / (AROUND * parts) * pitch:.3g} or smaller"
         )
         raise InputError(
             f"{counts[0]}×{counts[1]} pixels of {short(pitch)} take {AROUND * parts * counts[0]}×"
-            f"{AROUND * parts * counts[1]} points by waves, {short(pitch / parts)} apart, and {LARGEST} a side are "
-            f"the most: {way_out}"
+            f"{AROUND * parts * counts[1]} points by waves, {short(pitch / parts)} apart, and {LARGEST} a side "
+            f"are the most: {way_out}"
         )
 
     def margin(self, pitch: float) -> int:

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
+from vcc.base.values import content
+from vcc.plan.following import NONE_KEPT, Parts
 from vcc.plan.footprints.batch import Apart, Looks
 from vcc.plan.footprints.detail import detail_lost
 from vcc.plan.footprints.planes import Plane
@@ -47,11 +49,22 @@ with the detail that they do not resolve."""
 
 
 class Detail:
-    """Detail measured on patterns, which decides how cells are divided."""
+    """Detail measured on patterns, which decides how cells are divided.
+
+    Args:
+        parts: caches what is measured, for neighbouring plans.
+    """
+
+    def __init__(self, parts: Parts = NONE_KEPT) -> None:
+        self._parts = parts
 
     def lost(self, plane: Plane, known: Array, added: Array) -> float:
         """See `detail_lost`."""
-        return detail_lost(plane, known, added)
+        return self._parts.part(
+            "detail lost",
+            lambda: (content(plane.pattern), known.tobytes(), added.tobytes()),
+            lambda: detail_lost(plane, known, added),
+        )
 
     def joint_variation(self, looks: Looks) -> Apart:
         """See `Looks.apart`."""
