@@ -85,8 +85,8 @@ def test_by_footprints_lens_and_sensor():
 def test_the_pitch_where_differences_of_captures_need_small_steps():
     """Cells against the sensor cross the edges of sensitive areas: a step of 1e-3 contains some crossings.
 
-    Between them, the image is smooth in the pitch. Detail of two pixels moves by 10 pixels per pitch at the ends: a
-    central difference over h errs by (π·10·h)²/6, 7e-6 of the largest slope for h = 2e-4; the sum is less steep.
+    Between them, the image is smooth in the pitch. Detail of two pixels moves by 10 pixels per pitch at the ends:
+    a central difference over h errs by (π·10·h)²/6, 7e-6 of the largest slope for h = 2e-4; the sum is flatter.
     """
     random = np.random.default_rng(13)
     field = vcc.LightField.from_views(

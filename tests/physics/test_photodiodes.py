@@ -137,7 +137,7 @@ def test_the_photodiodes_add_up_to_the_ordinary_image_by_footprints(kind, seed):
 
 
 def test_photodiodes_share_what_is_measured_on_a_function():
-    """Images of four are those of each alone, and a mask's function is evaluated little more often than for one."""
+    """Images of four are those of each alone, and a mask's function is evaluated half as often or less."""
     points = 0
 
     def transmission(x, y):

@@ -160,7 +160,7 @@ class Looks(Brief):
         def error(parts: int) -> float:
             if parts < known[1]:
                 return coarse if parts == known[0] else self._error(own, parts)
-            return fine * ratio ** math.log2(parts / known[1])
+            return float(fine * ratio ** math.log2(parts / known[1]))
 
         varying = sum(np.asarray(np.ptp(each, axis=(-2, -1)) > 0, dtype=int) for each in values)
         share = float(np.mean(np.asarray(varying) > 1))
@@ -177,8 +177,8 @@ class Looks(Brief):
             moved = len(self.groups)
             rest = math.prod(means[moved:], start=np.ones(1))
             taken = taken + rest * _linear(cut[0], means[:moved], cut[1:moved])
-        each = self.weights[..., None, None]
-        light, off = float((each * truth).mean()), (each * (taken - truth)).mean(axis=(1, 2, 3))
+        weights = self.weights[..., None, None]
+        light, off = float((weights * truth).mean()), (weights * (taken - truth)).mean(axis=(1, 2, 3))
         # A bias of the same sign everywhere counts twice.
         return max(math.sqrt(float(np.mean(off**2))), 2 * abs(float(off.mean()))) / light if light > 0 else 0.0
 
