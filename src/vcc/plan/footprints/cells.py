@@ -216,6 +216,13 @@ def divide_views(
     """
     if refine == 1:
         return CellDivision(1, False)
+
+    def smeared(parts: int) -> float:
+        """The error of closing the gaps between images of cells in so many parts."""
+        if max(between.gap_filled) == 0:
+            return 0.0
+        return max((_smeared(plane, between, geometry, detail, parts) for plane in path_planes), default=0.0)
+
     # Twice the detail is the most: with ten times, three masks far out of focus were wrong by 15 % of white.
     parts, fine = 1, FINE_DETAIL_IN_VIEW * min(least / ERROR, 2)
     for plane in (*view_planes, *path_planes):
@@ -223,10 +230,11 @@ def divide_views(
             if detail.lost(plane, np.zeros(2), _cell(plane, between) / parts) < fine:
                 break
             parts *= 2
+    if parts == 1 < max(between.gap_filled) and refine != "auto" and smeared(1) > least:
+        parts = 2
     spread = parts > 1
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
-    gaps = max(between.gap_filled) > 0
-    border = geometry.pictures if gaps and path_planes else None
+    border = geometry.pictures if spread and path_planes else None
     apart = Apart(_no_error, 0.0, (False,) * len(groups))
     if len(groups) + (border is not None) > 1:  # even if no view of this piece needs it: all pieces are alike
         apart = detail.joint_variation(
@@ -249,9 +257,7 @@ def divide_views(
 
     def left(finer: int, cut: int = 1) -> float:
         """The error of cells in so many parts, and in ``cut`` parts where one mask cuts them."""
-        of_masks = (misplaced(number, cut) for number in range(len(path_planes)))
-        smeared = (_smeared(plane, between, geometry, detail, finer if spread else 1) for plane in path_planes)
-        return max(apart.error(finer), *of_masks, *(smeared if gaps else ()), 0.0)
+        return max(apart.error(finer), *(misplaced(number, cut) for number in range(len(path_planes))), 0.0)
 
     def chosen(share: float, left: Callable[[int], float]) -> tuple[int, float]:
         """The number of parts for cells that hold this share of the rays, and the remaining error."""
@@ -264,7 +270,7 @@ def divide_views(
         return finer, left(finer)
 
     if spread:  # a tent reaches over divided and undivided cells
-        finer, error = chosen(1.0, lambda parts: left(parts, parts))
+        finer, error = chosen(1.0, lambda parts: max(left(parts, parts), smeared(parts)))
         return CellDivision(finer, True, error=error)
     finer, error = chosen(apart.share, left)
     errs = [plane for number, plane in enumerate(path_planes) if misplaced(number, 1) > least]
@@ -273,7 +279,7 @@ def divide_views(
         if all_cut[1] <= error:  # otherwise dividing few cells further leaves less error
             finer, error = all_cut
             where = where | geometry.varying(errs)
-    return CellDivision(parts, False, finer, where, error)
+    return CellDivision(parts, False, finer, where, max(error, smeared(1)))
 
 
 def _where_joint(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:
