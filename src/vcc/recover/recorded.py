@@ -71,10 +71,11 @@ def set_to_zero(values: Floats, stacklevel: int) -> Floats:
     np.maximum(values, 0, out=values)
     added = float(values.sum(dtype=np.float64)) - total
     if added > ADDED * abs(total):
+        much = f"adds {added / total:.1%} to their light" if total > 0 else "is all their light"
         warnings.warn(
-            f"negative values of the decoded views (noise, ringing) are set to 0, which adds "
-            f"{added / max(total, 1e-300):.1%} to their light, most in dark parts. For views without a bias add a "
-            "constant to the recording, decode it, and subtract the decoded constant: decoding is linear",
+            f"negative values of the decoded views (noise, ringing) are set to 0, which {much}, most in dark "
+            "parts. For views without a bias add a constant to the recording, decode it, and subtract the decoded "
+            "constant: decoding is linear",
             ResultWarning,
             stacklevel=stacklevel + 1,
         )

@@ -110,7 +110,7 @@ class Looks(Brief):
             view, weights = _views_met(every, even, pixel, extent), np.ones((1, 1))
         else:
             every.append((pictures, _by_view_and_pixel(pictures, on_sensor)))
-            view, weights = _views_lit(every, even, pixel)
+            view, weights = _views_lit(every, even, pixel, extent)
         part = (np.arange(POINTS) + 0.5) / POINTS - 0.5
         inside = np.stack(np.meshgrid(part, part), axis=-1)
 
@@ -235,13 +235,16 @@ def _views_met(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, exte
     return np.asarray(even * (columns, rows) + np.array([columns - 1, rows - 1]) / 2)
 
 
-def _views_lit(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array) -> tuple[Array, Array]:
+def _views_lit(
+    planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, extent: tuple[float, float]
+) -> tuple[Array, Array]:
     """Views (i, j), fractional, whose cells each pixel may see through all planes, and weights of the pixels.
 
     Args:
-        planes: with the maps to them; one or more of finite size.
+        planes: with the maps to them.
         even: places −½ … ½, (pixels, rays, 2).
         pixel: places on the sensor, (pixels, 1, 2).
+        extent: (rows, columns) of the grid of views, if no plane bounds the light.
     """
     low, high = np.full(pixel.shape, -np.inf), np.full(pixel.shape, np.inf)
     for plane, (by_view, by_pixel, offset) in planes:
@@ -250,6 +253,8 @@ def _views_lit(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array) -> t
             inverse = np.linalg.inv(by_view)
             middle, half = -(pixel @ by_pixel.T + offset) @ inverse.T, np.abs(inverse) @ size / 2
             low, high = np.maximum(low, middle - half), np.minimum(high, middle + half)
+    low = np.where(np.isinf(low), -0.5, low)
+    high = np.where(np.isinf(high), np.array(extent[::-1]) - 0.5, high)
     size = np.maximum(high - low, 0.0) + 1.0  # half a cell on each side: cells that an edge cuts
     weights = size.prod(axis=-1)
     return (low + high) / 2 + even * size, weights / weights.mean()
