@@ -21,7 +21,7 @@ from vcc.image import Image, PhotodiodeImage
 from vcc.optics.sensor import Sensor
 from vcc.optics.train import Train
 from vcc.run.demosaic import Demosaicing, demosaic
-from vcc.run.expose import Exposure, RawPicture, below_zero
+from vcc.run.expose import Exposure, RawPicture, below_zero, cut_off
 from vcc.run.photon_transfer import PhotonTransfer as PhotonTransfer
 from vcc.run.photon_transfer import photon_transfer as photon_transfer
 
@@ -204,7 +204,8 @@ def expose_image(
     Warns:
         ResultWarning: the image is negative by more than `vcc.run.expose.UNDERSHOOT` of its largest value.
             Negative light does not exist, so it is set to 0. Smaller undershoots, from sharp interpolation at
-            hard edges, are also set to 0, without a warning.
+            hard edges, are also set to 0, without a warning. Or noise of dark pixels is cut off at the digital
+            number 0, because the black level is too low.
     """
     return recorded(image, Exposure(sensor, exposure, seed, radiance, threads))
 
@@ -231,9 +232,9 @@ def recorded(image: Image, exposure: Exposure) -> Recording:
         raise InputError("the image is upright, but a sensor records the inverted one: pass the image as captured")
     light = image.to_numpy()
     raw = exposure.recorded(light, image.missing_rays)
-    caution = below_zero(light)
-    if caution is not None:
-        warn_of_result(caution)
+    for caution in (below_zero(light), cut_off(raw.values, raw.electronics)):
+        if caution is not None:
+            warn_of_result(caution)
     return Recording(**{each.name: getattr(raw, each.name) for each in fields(raw)}, camera=image.camera)
 
 

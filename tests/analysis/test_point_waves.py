@@ -1,6 +1,7 @@
 """Point spread functions by waves: Airy's pattern, the transfer function of a disc, and the angular spectrum."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -85,7 +86,8 @@ def test_a_lens_of_glass_is_taken_at_the_wavelength():
     [
         ([LENS], {"aperture": (1 * mm, 1 * mm)}, "waves need the camera's stops"),
         ([LENS], {"distance": 0.06, "pitch": 20 * um}, "60 waves of defocus"),
-        ([LENS], {"pitch": 200 * um, "shape": (201, 201)}, "2048 a side are the most"),
+        ([LENS], {"pitch": 200 * um, "shape": (201, 201)}, r"2048 a side are the most: pass shape=\(\d"),
+        ([LENS], {"pitch": 4 * mm, "shape": (3, 3)}, "2048 a side are the most: pass pitch=0.00"),
         ([LENS, vcc.Diffuser(vcc.kernels.Gaussian(0.01))], {}, "scatter rays, not waves"),
         ([LENS], {"wavelength": -1.0}, "wavelength"),
     ],
@@ -94,3 +96,20 @@ def test_what_waves_cannot_do_is_refused(elements, options, words):
     settings = {"distance": math.inf, "wavelength": GREEN} | options
     with pytest.raises(vcc.InputError, match=words):
         psf(camera(*elements), settings.pop("distance"), **settings)
+
+
+def test_the_shape_that_an_error_names_can_be_had():
+    coded = camera(LENS, vcc.Mask(np.eye(5), width=6 * mm, z=20 * mm), d=51 * mm)
+    with pytest.raises(vcc.InputError, match="are the most") as refused:
+        psf(coded, 10.0, wavelength=GREEN, pitch=20 * um, shape=(150, 20))
+    found = re.search(r"shape=\((\d+), (\d+)\)", str(refused.value))
+    rows, columns = int(found[1]), int(found[2])
+    assert (rows < 150, columns) == (True, 20)
+    assert psf(coded, 10.0, wavelength=GREEN, pitch=20 * um, shape=(rows, columns)).shape == (rows, columns)
+
+
+def test_pixels_that_are_not_square_hold_the_light_of_the_square_ones_in_them():
+    high = vcc.Camera([LENS], vcc.Sensor(z=F, shape=(9, 41), pitch=(7 * um, 1 * um)))
+    found = psf(high, math.inf, wavelength=GREEN, shape=(9, 41)).values
+    fine = psf(camera(LENS), math.inf, wavelength=GREEN, shape=(63, 41)).values
+    np.testing.assert_allclose(found, fine.reshape(9, 7, 41).sum(axis=1), atol=1e-4 * found.max())

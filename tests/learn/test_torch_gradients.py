@@ -82,6 +82,42 @@ def test_by_footprints_lens_and_sensor():
     check(camera, [name for name in names(camera) if name.split(".")[0] in ("main", "sensor")], refine=1)
 
 
+def test_the_pitch_where_differences_of_captures_need_small_steps():
+    """Cells against the sensor cross the edges of sensitive areas: a step of 1e-3 contains some crossings.
+
+    Between them, the image is smooth in the pitch. Detail of two pixels moves by 10 pixels per pitch at the ends:
+    a central difference over h errs by (π·10·h)²/6, 7e-6 of the largest slope for h = 2e-4; the sum is flatter.
+    """
+    random = np.random.default_rng(13)
+    field = vcc.LightField.from_views(
+        random.random((3, 3, 20, 20)), 1 * mm, 2e-3, disparity_range=(0, 1), sample="point"
+    )
+    pitch, z = 0.05 * mm, 56 * mm
+    cells = vcc.Mask(random.random((30, 30)), width=21 * pitch, z=z)
+    sensor = vcc.Sensor(z, (21, 22), pitch, fill_factor=0.373)
+    camera = vcc.Camera([vcc.Lens(50 * mm, diameter=3 * mm), cells], sensor)
+    weights = random.standard_normal(sensor.shape)
+    model = CameraModule(camera, field, ["sensor.pitch"], engine="reference")
+    number = torch.tensor(pitch, dtype=torch.float64, requires_grad=True)
+    picture = model(values={"sensor.pitch": number}).reshape(sensor.shape)
+    (slope,) = torch.autograd.grad((picture * torch.as_tensor(weights)).sum(), number)
+
+    def difference(step):
+        ends = (
+            vcc.Camera(camera.elements, replace(sensor, pitch=pitch * (1 + each)))
+            .capture(field, engine="reference")
+            .values.astype(float)
+            for each in (step, -step)
+        )
+        return sum(sign * (each * weights).sum() for sign, each in zip((1, -1), ends, strict=True)) / (
+            2 * step * pitch
+        )
+
+    found = [difference(step) / float(slope) - 1 for step in (1e-3, 2e-4)]
+    assert abs(found[0]) > 1e-2
+    assert abs(found[1]) < 1e-4
+
+
 @pytest.mark.parametrize("kind", BY_RAYS)
 def test_by_rays(kind):
     camera, how = camera_with(kind), vcc.How(method="rays", samples=8)

@@ -134,3 +134,25 @@ def test_the_photodiodes_add_up_to_the_ordinary_image_by_footprints(kind, seed):
     whole, total = summed(case, changed, "footprints")
     root_mean_square = float(np.sqrt(np.mean((total - whole) ** 2)))
     assert root_mean_square < (1e-6 if kind == "one mask" else 10 ** (-TARGETS[kind] / 20))
+
+
+def test_photodiodes_share_what_is_measured_on_a_function():
+    """Images of four are those of each alone, and a mask's function is evaluated half as often or less."""
+    points = 0
+
+    def transmission(x, y):
+        nonlocal points
+        points += np.broadcast(x, y).size
+        return 0.5 + 0.4 * np.sin(3000 * x) * np.cos(2500 * y)
+
+    samples = np.random.default_rng(0).random((5, 5, 16, 16)).astype(np.float32)
+    field = vcc.LightField.from_views(samples, 1 * mm, 4e-3, 1.0, disparity_range=(-0.5, 0.5))
+    mask = vcc.Mask(vcc.patterns.FunctionPattern(transmission), width=8 * mm, z=50 * mm)
+    sensor = vcc.Sensor(52.6 * mm, (16, 16), 0.2 * mm, photodiodes=(2, 2))
+    camera = vcc.Camera([vcc.Lens(50 * mm, diameter=4 * mm), mask], sensor)
+    image = camera.capture(field)
+    together, points = points, 0
+    for row, column in itertools.product(range(2), repeat=2):
+        alone = camera.photodiode(row, column).capture(field)
+        np.testing.assert_array_equal(image.photodiodes[row][column].values, alone.values)
+    assert together < 0.5 * points

@@ -18,7 +18,15 @@ from vcc.plan.depth_rule import denser
 from vcc.plan.following import Follow
 from vcc.plan.footprints.around import Sharpened, _check_raster, choose_gaps, choose_sharp_footprint, filled
 from vcc.plan.footprints.batch import Apart
-from vcc.plan.footprints.cells import Detail, Geometry, SampleDivision, _misplaced, divide_samples, divide_views
+from vcc.plan.footprints.cells import (
+    Detail,
+    Geometry,
+    SampleDivision,
+    _misplaced,
+    _smeared,
+    divide_samples,
+    divide_views,
+)
 from vcc.plan.footprints.compile import ByFootprints, choose_taps
 from vcc.plan.footprints.diffusers import Blurs
 from vcc.plan.footprints.landing import Landing, choose_landing
@@ -156,17 +164,50 @@ def test_light_that_passes_a_part_of_a_cell_falls_beside_its_place():
     assert _misplaced(plane(), between(), geometry(), Told(-1e-9)) == 0
 
 
+def test_closing_gaps_between_images_blurs_shadows():
+    """By hand: images 2 and 3 pixels apart are ⅓ and 1.2 m apart on the mask, along which it is averaged over 1 m.
+
+    The box added is √(2·⅓·1) and √(2·1.2·1); half its variance is a box 1/√2 as wide.
+    """
+    seen = Told(lambda added: 0.02 if added[0] > 0.6 else 0.013)
+    assert _smeared(plane(), between(3, 2), geometry(), seen, 1) == pytest.approx(math.sqrt(2 * 0.013 - 0.02))
+    np.testing.assert_allclose(
+        [added for _, _, added in seen.asked], [np.sqrt([1 / 3, 1.2]), np.sqrt([2 / 3, 2.4])]
+    )
+    for _, known, _ in seen.asked:
+        np.testing.assert_allclose(known, geometry().penumbra(plane()))
+    _smeared(plane(), between(3, 2), geometry(), seen, 4)
+    np.testing.assert_allclose(seen.asked[-1][2], np.sqrt([2 / 3, 2.4]) / 4)
+    # A mask in the plane of the scene's image moves with it: nothing is blurred.
+    followed = between(3, 2, motion=np.diag([4.0, 5.0]))
+    assert _smeared(plane(), followed, geometry(), seen, 1) == 0
+
+
+def test_images_of_views_end_at_their_outermost_samples():
+    border = geometry(beyond=((1, 0), (0, 2))).pictures
+    for index, inside in (((0, -1), True), ((-1, 0), False), ((10, 7), True), ((11, 7), False), ((10, 8), False)):
+        place = border.at_index @ [5.0, 7.0, *index] + border.offset
+        assert bool(border.pattern(*place)) == inside
+    assert geometry(on_sensor=np.array([[2.0, 0, 0, 0], [0, 3.0, 0, 0]])).pictures is None
+
+
 def test_cells_that_a_mask_cuts_are_divided_for_what_would_fall_beside():
-    """An error of 0.072 falls as parts to the power 1.5: to 0.009 in four."""
-    division = divide_views([], [plane()], between(), geometry(), "auto", Told(0.04))
+    """An error of 0.072 falls as parts, and as parts to the power 1.5 at edges: to 0.009 in four."""
+
+    def edges(lost):
+        return Told(lambda added: lost * added[0])
+
+    division = divide_views([], [plane()], between(), geometry(), "auto", edges(0.04))
     assert (division.finer, division.parts) == (4, 1)
     assert division.error == pytest.approx(0.072 / 8)
     np.testing.assert_array_equal(division.where, geometry().varying([plane()]))
-    asked = divide_views([], [plane()], between(), geometry(), 8, Told(0.04))
+    asked = divide_views([], [plane()], between(), geometry(), 8, edges(0.04))
     assert (asked.finer, asked.error) == (8, pytest.approx(0.072 / 8**1.5))
-    little = divide_views([], [plane()], between(), geometry(), "auto", Told((0.9e-3 / 0.36) ** 2))
+    too_fine = divide_views([], [plane()], between(), geometry(), 8, Told(0.04))  # parts resolve nothing
+    assert (too_fine.finer, too_fine.error) == (8, pytest.approx(0.072 / 8))
+    little = divide_views([], [plane()], between(), geometry(), "auto", edges((0.9e-3 / 0.36) ** 2))
     assert (little.finer, little.where.any()) == (1, False)
-    once = divide_views([], [plane()], between(), geometry(), "auto", Told((2.7e-3 / 0.36) ** 2))
+    once = divide_views([], [plane()], between(), geometry(), "auto", edges((2.7e-3 / 0.36) ** 2))
     assert (once.finer, once.error) == (2, pytest.approx(2.7e-3 / 2**1.5))
     # Of two masks one errs: cells that it cuts are divided, and those in which both vary.
     far = plane(Circle(0.4), AT_INDEX * 3)
@@ -179,7 +220,7 @@ def test_cells_that_a_mask_cuts_are_divided_for_what_would_fall_beside():
     np.testing.assert_array_equal(two.where, cut)
     # Few cells that vary together, divided further, leave less than many divided a little.
     apart = Apart(lambda parts: 0.08 / parts**3, 0.1, (False, False))
-    calm = Told(lambda added: (2e-3 / 0.36) ** 2, apart)
+    calm = Told(lambda added: (2e-3 / 0.36) ** 2 * added[0], apart)
     both = divide_views(
         [plane(Circle(1.5), AT_INDEX * [1, 1, 0, 0])], [plane()], between(), geometry(), "auto", calm
     )

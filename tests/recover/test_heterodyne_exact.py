@@ -209,6 +209,7 @@ def test_carriers_are_lost_below_a_thousandth_of_their_strength(share, lost):
         decode_heterodyne(np.ones(sensor.shape), camera(), calibration=white)
 
 
+@pytest.mark.filterwarnings("ignore:negative values of the decoded views:vcc.ResultWarning")
 @pytest.mark.parametrize(("border", "cut"), [(0.25, (2, 3)), (0.1, (1, 1)), (0.11, (1, 2)), (0.0, (0, 0))])
 def test_borders_fade_out_as_raised_cosines_and_are_cut_off(border, cut):
     """Recording and calibration alike: decoding what is already faded out is decoding without a border."""

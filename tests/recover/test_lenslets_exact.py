@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 import vcc
 from vcc.base.errors import InputError, ResultWarning
@@ -186,6 +189,7 @@ def test_darkness_is_told_and_others_stand_in():
     assert (half[:, :2] > 0).all()
 
 
+@pytest.mark.filterwarnings("ignore:negative values of the decoded views:vcc.ResultWarning")
 def test_the_dark_frame_is_subtracted_and_nothing_is_less_than_dark():
     grid = lattice("square", 8.0, 0.0)
     value = recording()
@@ -519,3 +523,20 @@ def test_what_is_finer_than_lenslets_does_not_hide_them():
     lenslets = 1 + 0.2 * (np.cos(2 * np.pi * x / 9.3) + np.cos(2 * np.pi * y / 9.3))
     found = _from_spectrum(lenslets * (1 + 0.5 * (-1.0) ** (x + y)))
     assert found.pitch == pytest.approx(9.3, rel=0.01)
+
+
+@pytest.mark.parametrize("level", [1.0, 3.0])
+def test_light_that_is_added_to_dark_views_is_reported_with_its_size(level):
+    """Noise of standard deviation 1 around m has the mean m·Φ(m) + φ(m) where negative values are 0."""
+    grid = LensletGrid("square", (5.0, 5.0), ((10.0, 0.0), (0.0, 10.0)))
+    recording = level + np.random.default_rng(0).standard_normal((400, 400))
+    added = (level * norm.cdf(level) + norm.pdf(level)) / level - 1
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        views = decode_plenoptic(recording, grid, views=5)
+    said = [str(each.message) for each in caught if "negative values" in str(each.message)]
+    assert bool(said) == (added > 5e-3)
+    # 40² lenslets of 25 pixels: a mean has a standard error of 1/200.
+    assert np.asarray(views.values).mean() == pytest.approx(level * (1 + added), abs=4 / 200)
+    if said:
+        assert float(re.search(r"adds ([\d.]+)%", said[0])[1]) == pytest.approx(100 * added, abs=2)

@@ -13,6 +13,7 @@ import imagecodecs
 import numpy as np
 import pytest
 import tifffile
+from scipy.stats import norm
 
 import vcc
 from vcc.files.pictures import read_picture
@@ -694,3 +695,19 @@ def test_what_is_not_said_of_a_recording():
             vcc.Recording(np.zeros(shape, np.uint16), sensor(shape=(4, 6)), 1e-3)
     with pytest.raises(vcc.InputError, match="the shape"):
         vcc.Recording(np.zeros((4, 6, 3, 1), np.uint16), sensor(shape=(4, 6)), 1e-3)
+
+
+@pytest.mark.parametrize("level", [0.0, 10.0, 30.0, 41.0])
+def test_noise_that_is_cut_off_at_0_is_reported_with_what_it_adds(level):
+    """Of 512² dark pixels with noise of 10 numbers; scipy's normal distribution, integrated above 0."""
+    low = dataclasses.replace(QUIET, black_level=level, gain=2.0, read_noise=5.0, dark_current=0.0)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        mean = flat(low, 0).electrons().mean(dtype=np.float64)
+    added = norm(level, 10).expect(lambda x: x, lb=0) / 2 - level / 2
+    assert mean == pytest.approx(added, abs=3 * 5 / 512)
+    said = [str(each.message) for each in caught if "of the numbers are 0" in str(each.message)]
+    assert len(said) == (level < 40)
+    if said:
+        assert f"is {added:.3g} electrons" in said[0]
+        assert "Raise black_level to 40" in said[0]

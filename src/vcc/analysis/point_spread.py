@@ -184,12 +184,13 @@ def _by_waves(
     waves: WavesOfPoint, frame: Affine, counts: tuple[int, int], margin: int | None, area: float
 ) -> PointSpread:
     """The image by waves on a lattice, widened by a margin; None: that of `WavesOfPoint.margin`."""
-    pitch = float(np.abs(np.diag(frame.linear)).min())
+    sides = np.abs(np.diag(frame.linear))
+    pitch = float(sides.min())
     if margin is None:
         margin = waves.margin(pitch)
         frame = frame @ Affine.translation(-margin, -margin)
         counts = counts[0] + 2 * margin, counts[1] + 2 * margin
-    parts = waves.parts(pitch)
+    parts = waves.parts(float(sides.max()), counts)
     fine_frame = frame @ Affine.translation(*[(1 / parts - 1) / 2] * 2) @ Affine.scaling(1 / parts, 1 / parts)
     light = waves.light(fine_frame, (parts * counts[0], parts * counts[1]))
     values = _in_pixels(light, fine_frame, frame, counts)

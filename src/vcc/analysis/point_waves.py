@@ -80,9 +80,31 @@ class WavesOfPoint(Brief):
         largest_lag = np.abs(np.linalg.inv(self.pupil.sensor_from_slope)).T @ np.array(self.pupil.steps)
         return float(largest_lag.max()) * self.pupil.points / self.wavelength
 
-    def parts(self, pitch: float) -> int:
-        """The number of parts along a side of a pixel, so fine that nothing is aliased."""
-        return max(math.ceil(2 * self.cutoff * pitch), 1)
+    def parts(self, pitch: float, counts: tuple[int, int]) -> int:
+        """The number of parts along a side of a pixel, so fine that nothing is aliased.
+
+        Args:
+            pitch: the longer side of a pixel, metres.
+            counts: (rows, columns) of pixels.
+
+        Raises:
+            InputError: more than `LARGEST` parts along a side of the image.
+        """
+        parts = max(math.ceil(2 * self.cutoff * pitch), 1)
+        most = LARGEST // (AROUND * parts)
+        if max(counts) <= most:
+            return parts
+        way_out = (
+            f"pass shape=({min(counts[0], most)}, {min(counts[1], most)}) or smaller, the part around the point's "
+            "image"
+            if most > 0
+            else f"pass pitch={LARGEST / (AROUND * parts) * pitch:.3g} or smaller"
+        )
+        raise InputError(
+            f"{counts[0]}×{counts[1]} pixels of {short(pitch)} take {AROUND * parts * counts[0]}×"
+            f"{AROUND * parts * counts[1]} points by waves, {short(pitch / parts)} apart, and {LARGEST} a side "
+            f"are the most: {way_out}"
+        )
 
     def margin(self, pitch: float) -> int:
         """Pixels around the image by rays beyond which `BEYOND` of the light of a point in focus lies."""
@@ -94,18 +116,10 @@ class WavesOfPoint(Brief):
         Args:
             frame: of the lattice, maps (column, row, 1) to (x, y, 1), metres; not rotated.
             counts: (rows, columns).
-
-        Raises:
-            InputError: a lattice of more than `LARGEST` pixels per side.
         """
         from scipy.fft import fftfreq, ifft2, next_fast_len
 
         sizes = [next_fast_len(math.ceil(AROUND * count)) for count in counts]
-        if max(sizes) > LARGEST:
-            raise InputError(
-                f"the image by waves takes {sizes[0]}×{sizes[1]} points at {short(1 / (2 * self.cutoff))}, and "
-                f"{LARGEST} a side are the most: pass a smaller shape=, or finer pixels by pitch="
-            )
         horizontal, vertical = np.diag(frame.linear)
         fy, fx = (fftfreq(size, step) for size, step in zip(sizes, (vertical, horizontal), strict=True))
         frequencies = np.stack(np.meshgrid(fx, fy), axis=-1)

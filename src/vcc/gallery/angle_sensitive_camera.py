@@ -140,7 +140,11 @@ class AngleSensitive:
         return np.stack(found, axis=1).reshape(self.tiles[1], TILE**2, VIEWS**2)
 
     def decoded(self, image: Image) -> LightField:
-        """The light field at the lens, by least squares in each tile, regularised towards equal views."""
+        """The light field at the lens; see `views`."""
+        return self.light_field(self.views(image))
+
+    def views(self, image: Image) -> Array:
+        """Upright views by least squares in each tile, regularised towards equal views; of noise also negative."""
         stacked, mean = in_tiles(self.radiance(image), self.smoothing)
         rows, columns, _, channels = stacked.shape
         found = np.empty((rows, columns, VIEWS**2, channels))
@@ -151,8 +155,7 @@ class AngleSensitive:
             equal = mean[row][:, None]
             rest = stacked[row] - a.sum(axis=2)[..., None] * equal
             found[row] = equal + np.linalg.solve(normal + amount * np.eye(VIEWS**2), a.swapaxes(1, 2) @ rest)
-        views = found[::-1, ::-1].reshape(rows, columns, VIEWS, VIEWS, channels).transpose(2, 3, 0, 1, 4)
-        return self.light_field(views)
+        return found[::-1, ::-1].reshape(rows, columns, VIEWS, VIEWS, channels).transpose(2, 3, 0, 1, 4)
 
     def light_field(self, views: NDArray[np.floating]) -> LightField:
         """Views, upright, as the light field that they are at the lens."""
@@ -289,8 +292,21 @@ def measured_responses(camera: AngleSensitive) -> tuple[Array, Array, Array]:
 
 def through_lenslets(camera: AngleSensitive, image: Image) -> LightField:
     """The views of the plenoptic camera: one for each pixel behind a lenslet."""
+    return camera.light_field(lenslet_views(camera, image))
+
+
+def lenslet_views(camera: AngleSensitive, image: Image) -> Array:
+    """Upright views of the plenoptic camera; of noise also negative.
+
+    The decoder sets negative noise to 0, and is linear: a constant is added, and its own views are subtracted.
+    """
     share = LENSLET * camera.plenoptic.sensor.pitches[1] / (camera.plenoptic.sensor.z - camera.to_sensor)
     # A micro-image of white is as bright as the stop seen through the lenslet: (pitch/gap)² steradians.
     pitch_over_gap = share * camera.to_sensor / camera.plenoptic.sensor.z
-    views = decode_plenoptic(image, camera=camera.plenoptic, views=LENSLET)
-    return camera.light_field(np.asarray(views.values) / pitch_over_gap**2)
+    values = np.asarray(image.to_numpy(), np.float64)
+    constant = np.full_like(values, np.abs(values).max())
+    raised, alone = (
+        np.asarray(decode_plenoptic(each, camera=camera.plenoptic, views=LENSLET).values, np.float64)
+        for each in (values + constant, constant)
+    )
+    return np.asarray((raised - alone) / pitch_over_gap**2)

@@ -415,7 +415,13 @@ def compiled_each(
     """
     codes = _codes(trains, how)
     hows = [how] * len(trains) if seeds is None else [replace(how, seed=seed) for seed in seeds]
-    anew = (compile_best(train, grid, each) for train, each in zip(trains, hows, strict=True))
+    parts = Parts()
+
+    def planned(train: Train, one: How) -> Plan:
+        with parts.keeping():  # neighbours often share what is costly: the texture of a function, for instance
+            return compile_best(train, grid, one, parts)
+
+    anew = (planned(train, each) for train, each in zip(trains, hows, strict=True))
     if codes is None:
         return anew
     plans = codes.plans(grid, how)

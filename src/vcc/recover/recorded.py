@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+import warnings
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.errors import InputError
+from vcc.base.errors import InputError, ResultWarning
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.recording import Recording
 
 Array = NDArray[np.float64]
+Floats = TypeVar("Floats", NDArray[np.float32], NDArray[np.float64])
+
+ADDED = 5e-3
+"""Share of the light that setting negative values to 0 may add before it is reported."""
 
 
 def numbers_of(picture: Image | Recording | ArrayLike, what: str) -> Array:
@@ -50,3 +55,28 @@ def grey(values: Array) -> Array:
 def has_mosaic(picture: Any) -> bool:
     """Whether an input is a raw recording with a colour filter mosaic."""
     return isinstance(picture, Recording) and picture.electronics.color_filter is not None
+
+
+def set_to_zero(values: Floats, stacklevel: int) -> Floats:
+    """Set negative values of a decoded light field to 0, in place: radiance is not negative.
+
+    Args:
+        values: decoded.
+        stacklevel: of the warning, counted from the caller.
+
+    Warns:
+        ResultWarning: this adds more than `ADDED` of the light. Noise around 0 then has a mean above 0.
+    """
+    total = float(values.sum(dtype=np.float64))
+    np.maximum(values, 0, out=values)
+    added = float(values.sum(dtype=np.float64)) - total
+    if added > ADDED * abs(total):
+        much = f"adds {added / total:.1%} to their light" if total > 0 else "is all their light"
+        warnings.warn(
+            f"negative values of the decoded views (noise, ringing) are set to 0, which {much}, most in dark "
+            "parts. For views without a bias add a constant to the recording, decode it, and subtract the decoded "
+            "constant: decoding is linear",
+            ResultWarning,
+            stacklevel=stacklevel + 1,
+        )
+    return values

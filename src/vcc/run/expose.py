@@ -30,6 +30,11 @@ UNDERSHOOT: Final = 0.15
 """How far below 0 an image may go, as a share of its largest value: sharpening interpolation undershoots at edges
 (13 % at a border of the light field)."""
 
+HELD: Final = 4.0
+"""Standard deviations of noise below the black level that keep nearly all negative noise of dark pixels."""
+CUT: Final = 1e-3
+"""Share of digital numbers that are 0 above which noise that is cut off there is reported."""
+
 _BLOCK: Final = 2**18
 """Random numbers per block: a block fits a core's cache, and a large sensor has enough blocks for all cores."""
 _TEMPORAL, _PATTERN = 0, 1
@@ -200,6 +205,31 @@ def below_zero(light: NDArray[np.float32]) -> str | None:
     return (
         f"the picture on the sensor goes down to {low:.3g} (up to {high:.3g}): light cannot be negative, "
         "so these pixels are set to 0"
+    )
+
+
+def cut_off(values: NDArray[np.unsignedinteger], electronics: Electronics) -> str | None:
+    """A warning about noise that is cut off at the digital number 0; None if hardly any is.
+
+    Args:
+        values: recorded digital numbers.
+        electronics: of the sensor.
+    """
+    from scipy.special import ndtr  # slow to import
+
+    noise, level = electronics.gain * math.hypot(electronics.read_noise, electronics.dsnu), electronics.black_level
+    if level >= HELD * noise:
+        return None
+    share = 1 - np.count_nonzero(values) / values.size
+    if share <= CUT:
+        return None
+    # The mean of a normal number where negative ones are 0, less its own mean.
+    density = math.exp(-((level / noise) ** 2) / 2) / math.sqrt(2 * math.pi)
+    added = (noise * density - level * float(ndtr(-level / noise))) / electronics.gain
+    return (
+        f"{share:.1%} of the numbers are 0: the black level of {level:g} is less than {HELD:g} times the noise of "
+        f"{noise:.3g} digital numbers, which is cut off there. The mean of dark pixels is {added:.3g} electrons "
+        f"too high. Raise black_level to {math.ceil(HELD * noise)} or more"
     )
 
 

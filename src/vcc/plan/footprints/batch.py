@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 PIXELS, RAYS, POINTS = 3, 32, 8
 """Places of the sensor, of the aperture for each, and points each way across a cell; mirror images not counted."""
+WITH_BORDER = 12, 16
+"""Places of the sensor and of the aperture where the views' images may end on it: only a part of it may be lit."""
 HALVED = (0.25, 0.5)
 """Smallest and largest factor by which the error falls if cells are divided once more."""
 LARGEST = 100
@@ -60,11 +62,15 @@ class Looks(Brief):
             other elements are approximated linearly across the cell.
         places: on each plane of each group, at points of cells, (pixels, rays, points, points, 2), metres from the
             middle of its pattern.
+        border: whether these points lie within the views' images; None if no border matters.
+        weights: of the rays of each pixel, (pixels, 1).
     """
 
     groups: tuple[tuple[Plane, ...], ...]
     at_views: bool
     places: tuple[tuple[Array, ...], ...]
+    border: Array | None = None
+    weights: Array = field(default_factory=lambda: np.ones((1, 1)))
 
     @classmethod
     def of(
@@ -75,6 +81,7 @@ class Looks(Brief):
         on_sensor: Array,
         sensor: tuple[int, int],
         extent: tuple[float, float],
+        pictures: Plane | None = None,
     ) -> Looks:
         """Choose such places for a light field.
 
@@ -85,33 +92,46 @@ class Looks(Brief):
             on_sensor: 2×5, places on the sensor from indices (i, j, k, l, 1), pixels.
             sensor: (rows, columns) of pixels.
             extent: (rows, columns) of the grid of views.
+            pictures: the border of the views' images, see `Geometry.pictures`. Gaps between images are closed by a
+                blur, so that it varies within a cell as a pixel sees it.
         """
         maps = [[_by_view_and_pixel(plane, on_sensor) for plane in group] for group in groups]
         rng = np.random.default_rng(0)
-        even = _and_mirrored(rng.random((PIXELS, RAYS, 2)) - 0.5)
+        number, rays = (PIXELS, RAYS) if pictures is None else WITH_BORDER
+        even = _and_mirrored(rng.random((number, rays, 2)) - 0.5)
         pixels = np.array(sensor[::-1])
-        pixel = _and_mirrored(rng.random((PIXELS, 1, 2)) - 0.5) * pixels + (pixels - 1) / 2
+        pixel = _and_mirrored(rng.random((number, 1, 2)) - 0.5) * pixels + (pixels - 1) / 2
         every = [
             (plane, one)
             for group, each in zip(groups, maps, strict=True)
             for plane, one in zip(group, each, strict=True)
         ]
-        view = _views_met(every, even, pixel, extent)
+        if pictures is None:
+            view, weights = _views_met(every, even, pixel, extent), np.ones((1, 1))
+        else:
+            every.append((pictures, _by_view_and_pixel(pictures, on_sensor)))
+            view, weights = _views_lit(every, even, pixel, extent)
         part = (np.arange(POINTS) + 0.5) / POINTS - 0.5
         inside = np.stack(np.meshgrid(part, part), axis=-1)
 
-        def places(plane: Plane, one: _Map) -> Array:
+        def places(one: _Map, step: Array) -> Array:
             by_view, by_pixel, offset = one
             middle = view @ by_view.T + pixel @ by_pixel.T + offset
-            return np.asarray(middle[:, :, None, None] + inside @ plane.view_step(motion).T)
+            return np.asarray(middle[:, :, None, None] + inside @ step.T)
 
+        border = None
+        if pictures is not None:
+            _, one = every[-1]
+            border = pictures.pattern(*np.moveaxis(places(one, one.by_view), -1, 0))
         return cls(
             tuple(map(tuple, groups)),
             at_views,
             tuple(
-                tuple(places(plane, one) for plane, one in zip(group, each, strict=True))
+                tuple(places(one, plane.view_step(motion)) for plane, one in zip(group, each, strict=True))
                 for group, each in zip(groups, maps, strict=True)
             ),
+            border,
+            weights,
         )
 
     def values(self, number: int) -> Array:
@@ -131,12 +151,21 @@ class Looks(Brief):
             values: of all groups, instead of their own: (..., pixels, rays, points, points).
         """
         values = [self.values(n) for n in range(len(self.groups))] if values is None else values
-        whole, half = (self._error(values, parts) for parts in (1, 2))
-        ratio = float(np.clip(half / whole, *HALVED)) if whole > 0 else HALVED[0]
+        known, own = (1, 2), values
+        if self.border is not None:
+            known, own = (2, 4), [*values, self.border]
+        coarse, fine = (self._error(own, parts) for parts in known)
+        ratio = float(np.clip(fine / coarse, *HALVED)) if coarse > 0 else HALVED[0]
+
+        def error(parts: int) -> float:
+            if parts < known[1]:
+                return coarse if parts == known[0] else self._error(own, parts)
+            return float(fine * ratio ** math.log2(parts / known[1]))
+
         varying = sum(np.asarray(np.ptp(each, axis=(-2, -1)) > 0, dtype=int) for each in values)
         share = float(np.mean(np.asarray(varying) > 1))
         even = tuple(bool(np.ptp(each) == 0) for each in values)
-        return Apart(lambda parts: whole if parts == 1 else half * ratio ** math.log2(parts / 2), share, even)
+        return Apart(error, share, even)
 
     def _error(self, values: list[Array], parts: int) -> float:
         each = POINTS // parts
@@ -144,9 +173,12 @@ class Looks(Brief):
         means = [v.mean(axis=(4, 5)) for v in cut]
         truth = math.prod(cut[1:], start=cut[0]).mean(axis=(4, 5))
         taken = math.prod(means[1:], start=means[0])
-        if self.at_views:
-            taken = taken + _linear(cut[0], means, cut[1:])
-        light, off = float(truth.mean()), (taken - truth).mean(axis=(1, 2, 3))
+        if self.at_views:  # the border does not follow the open part of a cell
+            moved = len(self.groups)
+            rest = math.prod(means[moved:], start=np.ones(1))
+            taken = taken + rest * _linear(cut[0], means[:moved], cut[1:moved])
+        weights = self.weights[..., None, None]
+        light, off = float((weights * truth).mean()), (weights * (taken - truth)).mean(axis=(1, 2, 3))
         # A bias of the same sign everywhere counts twice.
         return max(math.sqrt(float(np.mean(off**2))), 2 * abs(float(off.mean()))) / light if light > 0 else 0.0
 
@@ -201,3 +233,28 @@ def _views_met(planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, exte
         return np.asarray(place @ np.linalg.inv(by_view).T)
     rows, columns = extent
     return np.asarray(even * (columns, rows) + np.array([columns - 1, rows - 1]) / 2)
+
+
+def _views_lit(
+    planes: list[tuple[Plane, _Map]], even: Array, pixel: Array, extent: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Views (i, j), fractional, whose cells each pixel may see through all planes, and weights of the pixels.
+
+    Args:
+        planes: with the maps to them.
+        even: places −½ … ½, (pixels, rays, 2).
+        pixel: places on the sensor, (pixels, 1, 2).
+        extent: (rows, columns) of the grid of views, if no plane bounds the light.
+    """
+    low, high = np.full(pixel.shape, -np.inf), np.full(pixel.shape, np.inf)
+    for plane, (by_view, by_pixel, offset) in planes:
+        size = np.array(plane.pattern.size)
+        if np.isfinite(size).all() and abs(np.linalg.det(by_view)) > 1e-12 * np.abs(by_view).max() ** 2:
+            inverse = np.linalg.inv(by_view)
+            middle, half = -(pixel @ by_pixel.T + offset) @ inverse.T, np.abs(inverse) @ size / 2
+            low, high = np.maximum(low, middle - half), np.minimum(high, middle + half)
+    low = np.where(np.isinf(low), -0.5, low)
+    high = np.where(np.isinf(high), np.array(extent[::-1]) - 0.5, high)
+    size = np.maximum(high - low, 0.0) + 1.0  # half a cell on each side: cells that an edge cuts
+    weights = size.prod(axis=-1)
+    return (low + high) / 2 + even * size, weights / weights.mean()

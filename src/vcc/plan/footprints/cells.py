@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
+from vcc.base.values import content
+from vcc.plan.following import NONE_KEPT, Parts
 from vcc.plan.footprints.batch import Apart, Looks
 from vcc.plan.footprints.detail import detail_lost
 from vcc.plan.footprints.planes import Plane
 from vcc.plan.footprints.taps import CellDivision, Taps
 from vcc.plan.how import LARGEST_REFINEMENT
 from vcc.plan.parallax_rule import BetweenViews
-from vcc.shapes.patterns import Circle
+from vcc.shapes.patterns import Bounded, Circle, Open
 from vcc.shapes.stacked_patterns import clear_over, dark_over, has_edges
 
 Array = NDArray[np.float64]
@@ -42,15 +44,27 @@ SHEARED = 1.3
 MISPLACED = 0.3
 """Error of a mask that cuts a view's cell, as a share of the light cut off, if the images of the cell lie one
 pixel apart on the sensor and the shadow of an edge is one pixel wide. Measured on 24 random cameras: 0.04 to
-0.13 with textures; 0.2 to 0.4 on a uniform field behind a stop."""
+0.13 with textures; 0.2 to 0.4 on a uniform field behind a stop. Of parts of cells, it falls as their width, and
+with the detail that they do not resolve."""
 
 
 class Detail:
-    """Detail measured on patterns, which decides how cells are divided."""
+    """Detail measured on patterns, which decides how cells are divided.
+
+    Args:
+        parts: caches what is measured, for neighbouring plans.
+    """
+
+    def __init__(self, parts: Parts = NONE_KEPT) -> None:
+        self._parts = parts
 
     def lost(self, plane: Plane, known: Array, added: Array) -> float:
         """See `detail_lost`."""
-        return detail_lost(plane, known, added)
+        return self._parts.part(
+            "detail lost",
+            lambda: (content(plane.pattern), known.tobytes(), added.tobytes()),
+            lambda: detail_lost(plane, known, added),
+        )
 
     def joint_variation(self, looks: Looks) -> Apart:
         """See `Looks.apart`."""
@@ -90,6 +104,15 @@ class Geometry(Brief):
     beyond: tuple[tuple[int, int], tuple[int, int]] = ((0, 0), (0, 0))
     stops: tuple[Plane, ...] = ()
 
+    @property
+    def pictures(self) -> Plane | None:
+        """The border of the views' images as a plane, in samples; None if a view is a point on the sensor."""
+        (above, below), (left, right) = self.beyond
+        size = np.array([self.samples[1] + left + right, self.samples[0] + above + below])
+        offset = np.array([left, above]) - (size - 1) / 2
+        border = Plane(Bounded(Open(), *size.tolist()), "", (0.0, 0.0), np.eye(4)[2:], offset)
+        return None if self.by_pixel(border) is None else border
+
     def met(self, plane: Plane, view: Array, parts: int = 1) -> tuple[Array, Array]:
         """The lowest and the highest place (x, y) at which the samples of parts of views meet a plane.
 
@@ -105,7 +128,7 @@ class Geometry(Brief):
         centre = view @ by_view.T + by_sample @ middle + plane.offset
         half = np.abs(by_view).sum(axis=1) / 2 / parts + np.abs(by_sample) @ np.array([ns, nt]) / 2
         low, high = centre - half, centre + half
-        by_pixel = self._by_pixel(plane)
+        by_pixel = self.by_pixel(plane)
         if by_pixel is not None:
             by_view = by_view - by_pixel @ self.on_sensor[:, :2]
             pixels = np.array(self.sensor[::-1])
@@ -129,17 +152,17 @@ class Geometry(Brief):
 
     def width_of_edges(self, plane: Plane) -> float:
         """Width of the shadows of edges on the sensor, along the sharper axis, pixels; infinite without edges."""
-        by_pixel = self._by_pixel(plane)
+        by_pixel = self.by_pixel(plane)
         if by_pixel is None or not has_edges(plane.pattern) or not self.varying([plane]).any():
             return math.inf
         return float((self.penumbra(plane) / np.maximum(np.abs(by_pixel).sum(axis=1), 1e-300)).min())
 
     def _by_view(self, plane: Plane) -> Array:
         """2×2: metres on a plane, either way, per view through which one point of the sensor sees it."""
-        by_pixel, by_view = self._by_pixel(plane), plane.at_index[:, :2]
+        by_pixel, by_view = self.by_pixel(plane), plane.at_index[:, :2]
         return np.abs(by_view if by_pixel is None else by_view - by_pixel @ self.on_sensor[:, :2])
 
-    def _by_pixel(self, plane: Plane) -> Array | None:
+    def by_pixel(self, plane: Plane) -> Array | None:
         """2×2: metres on a plane per pixel of the sensor, within a view; None if a view is a point."""
         step = self.on_sensor[:, 2:]
         if abs(np.linalg.det(step)) <= 1e-12 * np.abs(step).max() ** 2:
@@ -193,6 +216,13 @@ def divide_views(
     """
     if refine == 1:
         return CellDivision(1, False)
+
+    def smeared(parts: int) -> float:
+        """The error of closing the gaps between images of cells in so many parts."""
+        if max(between.gap_filled) == 0:
+            return 0.0
+        return max((_smeared(plane, between, geometry, detail, parts) for plane in path_planes), default=0.0)
+
     # Twice the detail is the most: with ten times, three masks far out of focus were wrong by 15 % of white.
     parts, fine = 1, FINE_DETAIL_IN_VIEW * min(least / ERROR, 2)
     for plane in (*view_planes, *path_planes):
@@ -200,10 +230,13 @@ def divide_views(
             if detail.lost(plane, np.zeros(2), _cell(plane, between) / parts) < fine:
                 break
             parts *= 2
+    if parts == 1 < max(between.gap_filled) and refine != "auto" and smeared(1) > least:
+        parts = 2
     spread = parts > 1
     groups = [view_planes] * bool(view_planes) + [[plane] for plane in path_planes]
+    border = geometry.pictures if spread and path_planes else None
     apart = Apart(_no_error, 0.0, (False,) * len(groups))
-    if len(groups) > 1:  # even if no view of this piece needs it: all pieces of a light field are divided alike
+    if len(groups) + (border is not None) > 1:  # even if no view of this piece needs it: all pieces are alike
         apart = detail.joint_variation(
             Looks.of(
                 groups,
@@ -212,11 +245,19 @@ def divide_views(
                 np.column_stack([geometry.on_sensor, geometry.origin]),
                 geometry.sensor,
                 geometry.extent,
+                border,
             )
         )
-    where = _where_joint([group for group, even in zip(groups, apart.even, strict=True) if not even], geometry)
-    cut = [(plane, _misplaced(plane, between, geometry, detail, least)) for plane in path_planes]
-    misplaced = max((error for _, error in cut), default=0.0)
+    varying = [group for group, even in zip(groups, apart.even, strict=True) if not even]
+    where = _where_joint(varying, geometry)
+
+    @cache
+    def misplaced(number: int, parts: int) -> float:
+        return _misplaced(path_planes[number], between, geometry, detail, least, parts)
+
+    def left(finer: int, cut: int = 1) -> float:
+        """The error of cells in so many parts, and in ``cut`` parts where one mask cuts them."""
+        return max(apart.error(finer), *(misplaced(number, cut) for number in range(len(path_planes))), 0.0)
 
     def chosen(share: float, left: Callable[[int], float]) -> tuple[int, float]:
         """The number of parts for cells that hold this share of the rays, and the remaining error."""
@@ -228,15 +269,17 @@ def divide_views(
             finer *= 2
         return finer, left(finer)
 
-    finer, error = chosen(apart.share, lambda parts: max(apart.error(parts), misplaced))
-    if misplaced > least:
-        all_cut = chosen(1.0, lambda parts: max(apart.error(parts), misplaced / parts**1.5))
+    if spread:  # a tent reaches over divided and undivided cells
+        finer, error = chosen(1.0, lambda parts: max(left(parts, parts), smeared(parts)))
+        return CellDivision(finer, True, error=error)
+    finer, error = chosen(apart.share, left)
+    errs = [plane for number, plane in enumerate(path_planes) if misplaced(number, 1) > least]
+    if errs:
+        all_cut = chosen(1.0, lambda parts: left(parts, parts))
         if all_cut[1] <= error:  # otherwise dividing few cells further leaves less error
             finer, error = all_cut
-            where = where | geometry.varying([plane for plane, error in cut if error > least])
-    if spread:  # a tent reaches over divided and undivided cells
-        return CellDivision(finer, True, error=error)
-    return CellDivision(parts, False, finer, where, error)
+            where = where | geometry.varying(errs)
+    return CellDivision(parts, False, finer, where, max(error, smeared(1)))
 
 
 def _where_joint(groups: list[list[Plane]], geometry: Geometry) -> NDArray[np.bool_]:
@@ -250,18 +293,43 @@ def _no_error(parts: int) -> float:
 
 
 def _misplaced(
-    plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail, least: float = ERROR
+    plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail, least: float = ERROR, parts: int = 1
 ) -> float:
-    """The error of treating light through a part of a view's cell as light through the centre of the cell.
+    """The error of treating light through a part of a view's cell as light through the centre of the part.
 
     The light falls next to its place on the sensor if the images formed by different parts of the cell lie apart.
     """
-    apart = geometry.on_sensor[:, :2] - geometry.on_sensor[:, 2:4] @ between.motion
     pixels = np.abs(geometry.on_sensor[:, 2:4]).sum(axis=1)
     sample, cell = np.abs(plane.sample_step).sum(axis=1), _cell(plane, between)
     shadow = np.min(cell * pixels / np.maximum(sample, 1e-300))
-    most = MISPLACED * float(np.abs(apart).sum(axis=1).max()) / max(float(shadow), 1.0)
-    return most * math.sqrt(max(detail.lost(plane, np.zeros(2), cell), 0.0)) if most > least else 0.0
+    apart = float(np.abs(_apart(between, geometry)).sum(axis=1).max())
+    most = MISPLACED * apart / max(float(shadow), 1.0) / parts
+    return most * math.sqrt(max(detail.lost(plane, np.zeros(2), cell / parts), 0.0)) if most > least else 0.0
+
+
+def _smeared(plane: Plane, between: BetweenViews, geometry: Geometry, detail: Detail, parts: int) -> float:
+    """The error of shadows that are blurred by closing the gaps between the images of parts of cells.
+
+    Seen from a pixel, a mask moves by V per view. It is averaged over a part of a cell along V + W, and its image
+    is blurred along W, the gap between two images on the mask. Both blurs are independent, and their variance
+    exceeds that along V by that of a box as long as √(2·|W|·|V + W|). A blur by a filter h leaves (1 − h)² of
+    the power of the shadow's detail: twice what half of its variance loses, less what all of it loses.
+    """
+    by_pixel = geometry.by_pixel(plane)
+    if by_pixel is None:
+        return 0.0
+    steps = by_pixel @ _apart(between, geometry), plane.view_step(between.motion)
+    gap, along = (np.abs(each).sum(axis=1) for each in steps)
+    added, known = np.sqrt(2 * gap * along) / parts, geometry.penumbra(plane)
+    if not (added > 0).any():
+        return 0.0
+    half, whole = (detail.lost(plane, known, each) for each in (added / math.sqrt(2), added))
+    return math.sqrt(max(2 * half - whole, 0.0))
+
+
+def _apart(between: BetweenViews, geometry: Geometry) -> Array:
+    """2×2: pixels between the images of neighbouring views of a point of the scene."""
+    return np.asarray(geometry.on_sensor[:, :2] - geometry.on_sensor[:, 2:4] @ between.motion)
 
 
 def _cell(plane: Plane, between: BetweenViews) -> Array:

@@ -302,7 +302,8 @@ class ByFootprints:
                 self.between,
                 self.geometry,
                 self.how.refine,
-                least=self._least_error,
+                Detail(self.parts),
+                self._least_error,
             ),
         )
 
@@ -325,7 +326,9 @@ class ByFootprints:
         return self.parts.decision(
             "samples",
             self._alike,
-            lambda: divide_samples(in_path, self.geometry, self.choose_cells, refine, least=self._least_error),
+            lambda: divide_samples(
+                in_path, self.geometry, self.choose_cells, refine, Detail(self.parts), self._least_error
+            ),
         )
 
     @property
