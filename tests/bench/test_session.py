@@ -157,6 +157,11 @@ def test_kind_that_comes_from_a_file_is_not_added_and_the_way_out_is_named(clien
 
 
 def test_a_real_lens_is_added_by_name_with_its_surfaces(client):
+    client.do("add", kind="aspheric-14mm")
+    words = client.until("refused")[0]["words"]
+    assert "is 105.1 mm long, and the widest gap of this camera is 26 mm" in words
+    assert "move the sensor to z = 132 mm or further" in words  # 26 mm, where the mask stands, and 105.1 mm
+    client.until("state")
     client.do("add", kind="phone-4mm", z=None)
     state, _ = client.until("state", "refused")
     assert state["is"] == "state", state
@@ -172,6 +177,9 @@ def test_each_kind_can_be_added_and_drawn(client, kind):
     drawn = state["side"]["elements"][2]
     assert (drawn["element"], drawn["kind"]) == (2, kind.replace("_", " "))
     assert state["document"]["camera"]["elements"][2]["name"]
+    client.do("add", kind=kind)  # where it makes sense: there, too, it is accepted
+    state, _ = client.until("state", "refused")
+    assert state["is"] == "state", state
 
 
 def test_pictures_are_compared_with_the_pinned_one(client):

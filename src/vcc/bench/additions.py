@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import itertools
 import math
 import os
 import re
@@ -144,10 +143,16 @@ def _default(field: Field[Any]) -> Any:
         return None
     unit = unit_of(field)
     if isinstance(field.default, tuple):
-        return [units.text(each, unit) if unit else each for each in field.default]
+        return [_quantity(each, unit) if unit else each for each in field.default]
     if unit is not None and isinstance(field.default, int | float):
-        return units.text(field.default, unit)
+        return _quantity(field.default, unit)
     return field.default if isinstance(field.default, bool | int | float | str) else None
+
+
+def _quantity(value: float, unit: str) -> str:
+    """As text; a zero in the unit that numbers typed after it should have."""
+    zeros = {"length": "0 mm", "angle": "0 deg", "time": "0 ms"}
+    return units.text(value, unit) if value else zeros.get(unit, units.text(value, unit))
 
 
 def _words_of_parameters(kind: type) -> dict[str, str]:
@@ -201,7 +206,15 @@ def _new_real_lens(kind: str, z: Any, train: Train, names: AbstractSet[str]) -> 
     """A lens by name, with its surfaces, in the middle of the widest gap that light meets."""
     lens = _real_lens(kind)
     if z is None:
-        z = _length(max(_suitable_place("real_lens", train) - lens.length / 2, 0.0), 6)
+        low, gap = _widest_gap(train)
+        if lens.length > gap:
+            last = max([0.0, *(one.z + one.length for one in train.elements)])
+            raise InputError(
+                f"{kind} is {_length(lens.length, 4)} long, and the widest gap of this camera is {_length(gap, 4)}: "
+                f"move the sensor to z = {_length(math.ceil(1e3 * (last + lens.length)) / 1e3, 6)} or further, or "
+                "remove elements"
+            )
+        z = _length(low + (gap - lens.length) / 2, 6)
     units.parse(z, "length", "z")
     alone = Train([lens], replace(train.sensor, z=lens.length, electronics=None))
     tables, _ = tables_of_train(alone, NOWHERE)
@@ -224,17 +237,26 @@ def _suitable_place(kind: str, train: Train) -> float:
     """
     z = train.sensor.z
     if kind in BEFORE_SENSOR:
-        before = units.parse(_lenslets(train)["focal_length"], "length", "z") if kind == "lens_array" else z / 25
-        return max(z - before, 0.0)
+        if kind == "lens_array":
+            return max(z - units.parse(_lenslets(train)["focal_length"], "length", "z"), 0.0)
+        return z - z / (16 if kind == "louvre" else 25)  # a louvre is z/20 high
     stop = next((one.z for one in train.elements if isinstance(one, Lens | FirstOrder)), None)
     if stop is None:
         stop = next((stage.z for stage in train.stages if np.isfinite(stage.opening[0])), 0.0)
     if kind not in IN_GAPS:
         return min(stop, z)
-    places = sorted({0.0, z, *(end for one in train.elements for end in (one.z, one.z + one.length))})
-    gaps = [(high - low, low) for low, high in itertools.pairwise(places)]
-    widest, low = max(gaps, default=(0.0, 0.0), key=lambda gap: (round(gap[0], 9), -gap[1]))
-    return low + widest / 2
+    low, gap = _widest_gap(train)
+    return low + gap / 2
+
+
+def _widest_gap(train: Train) -> tuple[float, float]:
+    """Where the widest gap between elements, the entrance plane and the sensor begins, and its width, metres."""
+    gaps, end = [], 0.0
+    for start, behind in sorted([(one.z, one.z + one.length) for one in train.elements] + [(train.sensor.z,) * 2]):
+        gaps.append((start - end, end))
+        end = max(end, behind)
+    widest, low = max(gaps, key=lambda gap: (round(gap[0], 9), -gap[1]))
+    return low, widest
 
 
 def _lenslets(train: Train) -> Json:
@@ -269,8 +291,7 @@ def _first_opening(train: Train) -> list[float]:
 
 
 def _length(value: float, digits: int = 3) -> str:
-    """As text; zero in the unit that typed numbers then have."""
-    return units.text(float(f"{value:.{digits}g}"), "length") if value else "0 mm"
+    return _quantity(float(f"{value:.{digits}g}"), "length")
 
 
 _NEW: Mapping[str, Callable[[float, float], Json]] = {
