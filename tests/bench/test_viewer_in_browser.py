@@ -62,7 +62,9 @@ def test_pointer_reads_values_and_the_place_on_the_sensor(page):
     page.page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + box["height"] / 2)
     reading = page.page.locator(".line [role=status]", has_text="DN")
     reading.wait_for()
-    assert reading.evaluate("of => of.scrollWidth <= of.clientWidth && of.scrollHeight <= of.parentElement.clientHeight")
+    assert reading.evaluate(
+        "of => of.scrollWidth <= of.clientWidth && of.scrollHeight <= of.parentElement.clientHeight"
+    )
 
 
 def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):

@@ -169,7 +169,7 @@ function familyField(bench: Bench, parameter: Parameter, family: Kind[], value: 
   const drawable = parameter.family === "pattern" && parameter.takes.includes("array");
   const chosen = table ? String(table["name"] ?? "") : rows ? DRAWN : typeof value === "string" ? value : Array.isArray(value) ? `${value.length} together` : "";
   const kind = family.find((each) => each.kind === chosen);
-  const known = [...family.map((each) => each.kind), ...(drawable ? [DRAWN, FROM_FILE] : [])];
+  const known = [...family.filter((each) => drawable || !each.cells).map((each) => each.kind), ...(drawable ? [DRAWN, FROM_FILE] : [])];
   const choose = (event: Event) => {
     const select = event.target as HTMLSelectElement;
     const name = select.value;

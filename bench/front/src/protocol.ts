@@ -47,11 +47,12 @@ export interface Parameter {
   parameters?: Parameter[];
 }
 
-/** A kind of element or pattern; of elements, whether a bench can add one. */
+/** A kind of element or pattern. */
 export interface Kind {
   kind: string;
   words: string;
   addable?: boolean;
+  cells?: boolean;
   parameters: Parameter[];
 }
 

@@ -78,7 +78,10 @@ def families() -> Json:
     return {
         noun: [
             *(_kind(name, kind) for name, kind in family.names.items()),
-            *(_kind(name, kind, words=f"A {name.upper()}.") for name, kind in family.arrays.items()),
+            *(
+                _kind(name, kind, words=f"A {name.upper()}.") | {"cells": True}
+                for name, kind in family.arrays.items()
+            ),
         ]
         for noun, family in sorted(found.items())
     }
@@ -208,11 +211,11 @@ def _new_real_lens(kind: str, z: Any, train: Train, names: AbstractSet[str]) -> 
     if z is None:
         low, gap = _widest_gap(train)
         if lens.length > gap:
-            last = max([0.0, *(one.z + one.length for one in train.elements)])
+            room = max([0.0, *(one.z + one.length for one in train.elements)]) + lens.length
             raise InputError(
-                f"{kind} is {_length(lens.length, 4)} long, and the widest gap of this camera is {_length(gap, 4)}: "
-                f"move the sensor to z = {_length(math.ceil(1e3 * (last + lens.length)) / 1e3, 6)} or further, or "
-                "remove elements"
+                f"{kind} is {_length(lens.length, 4)} long, and the widest gap of this camera is "
+                f"{_length(gap, 4)}: move the sensor to z = {_length(math.ceil(1e3 * room) / 1e3, 6)} or "
+                "further, or remove elements"
             )
         z = _length(low + (gap - lens.length) / 2, 6)
     units.parse(z, "length", "z")
@@ -348,19 +351,26 @@ def made_whole(
     Returns:
         (path, value), in order.
     """
-    inside = isinstance(where, list) and len(where) == 3 and where[0] == "elements" and type(where[1]) is int
-    if not inside or not 0 <= where[1] < len(described.elements):
+    train, number = described.train, _element_of(where, len(described.elements))
+    if number is None and not (isinstance(where, list) and where[:1] == ["sensor"]):
         return [(where, value)]
-    train, z = described.train, described.elements[where[1]].z
-    long, wide = max(train.sensor.z, 1e-3), _width_at(train, z)
+    table = {} if number is None else camera["elements"][number]
+    long = max(train.sensor.z, 1e-3)
+    wide = _width_at(train, train.sensor.z if number is None else described.elements[number].z)
     name = value.get("name") if isinstance(value, dict) else None
     if isinstance(name, str) and len(value) == 1 and name in _CHOSEN:
-        value = value | _CHOSEN[name](long, wide)
-    table = camera["elements"][where[1]]
+        by_slope = number is None or table.get("kind") == "angle_filter"  # 1 m for a slope of 1
+        value = value | _CHOSEN[name](*((1.0, _width_at(train, 0.0) / long) if by_slope else (long, wide)))
     cells = isinstance(value, list) or name == "mura"
-    if where[2] == "pattern" and cells and "width" not in table and table.get("kind") == "mask":
+    if where[2:] == ["pattern"] and cells and "width" not in table and table.get("kind") == "mask":
         return [([*where[:2], "width"], _length(wide, 2)), (where, value)]
     return [(where, value)]
+
+
+def _element_of(where: Any, count: int) -> int | None:
+    """The element of which a path names a parameter."""
+    inside = isinstance(where, list) and len(where) >= 3 and where[0] == "elements" and type(where[1]) is int
+    return where[1] if inside and 0 <= where[1] < count else None
 
 
 def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], str | None]:

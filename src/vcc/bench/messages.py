@@ -71,11 +71,15 @@ class Parameter(TypedDict):
 
 
 class Kind(TypedDict):
-    """A kind of element or pattern; of elements, whether a bench can add one."""
+    """A kind of element or pattern.
+
+    ``addable``: whether a bench can add such an element; ``cells``: whether such a pattern is an array of cells.
+    """
 
     kind: str
     words: str
     addable: NotRequired[bool]
+    cells: NotRequired[bool]
     parameters: list[Parameter]
 
 
