@@ -357,7 +357,7 @@ export class Bench extends EventTarget {
         await this.hearAnswer(message, buffers);
         break;
       case "file":
-        if (buffers[0]) saved(message.name, message.type, buffers[0]);
+        if (buffers[0]) saved(message.name, new Blob([bytesOf(buffers[0])], { type: message.type }));
         this.progress = null;
         break;
       case "refused":
@@ -566,8 +566,8 @@ async function decoded(view: DataView): Promise<ImageBitmap> {
   return createImageBitmap(image);
 }
 
-function saved(name: string, type: string, view: DataView): void {
-  const address = URL.createObjectURL(new Blob([bytesOf(view)], { type }));
+export function saved(name: string, file: Blob): void {
+  const address = URL.createObjectURL(file);
   const link = document.createElement("a");
   link.href = address;
   link.download = name;

@@ -3,6 +3,7 @@
 import { html, css, nothing } from "lit";
 
 import { answerStyles } from "./answers";
+import { saved } from "./bench";
 import { drawPictures, type Compare } from "./canvas";
 import { plain, short } from "./numbers";
 import { Part, controls } from "./part";
@@ -284,15 +285,7 @@ export class PictureView extends Part {
 
   private saveAsShown(): void {
     this.canvas.toBlob((blob) => {
-      if (!blob) return;
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(blob);
-      link.download = "as-shown.png";
-      link.hidden = true;
-      document.body.append(link);
-      link.click();
-      link.remove();
-      window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+      if (blob) saved("as-shown.png", blob);
     });
   }
 

@@ -298,8 +298,6 @@ export interface PictureMessage {
   photodiodes: [number, number];
   /** Share of the rays that the light field lacks. */
   missing: number;
-  /** Whether rays were traced. */
-  by_rays: boolean;
   /** Milliseconds. */
   took: number;
   /** Against the reference pin, dB. */
@@ -378,7 +376,6 @@ export interface PointAnswer {
   words: string;
   shape: [number, number];
   distance: number | null;
-  brightest: number;
   outside: number;
   remark: string | null;
 }

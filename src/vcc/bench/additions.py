@@ -397,7 +397,7 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], st
             values = read_array(file.name, None, True, "the picture", beside)
         except InputError as error:  # it names a file of this function
             words = str(error).replace(f"{file.parent}{os.sep}", "").replace(folder, "").replace(file.name, name)
-            raise InputError(f"{shown(name)}: {words}") from None
+            raise InputError(words.removeprefix("the picture: ")) from None
     if values.ndim == 3:
         values = values.mean(axis=2)
     if values.ndim != 2 or values.size == 0:

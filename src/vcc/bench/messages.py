@@ -363,7 +363,6 @@ class PictureMessage(TypedDict):
         channels: of the image; 0 for a grey one.
         photodiodes: rows and columns in a pixel.
         missing: share of the rays that the light field lacks.
-        by_rays: whether rays were traced.
         took: milliseconds.
         psnr: against the reference pin, dB.
         same: whether it equals that.
@@ -379,7 +378,6 @@ class PictureMessage(TypedDict):
     channels: int
     photodiodes: Shape
     missing: float
-    by_rays: bool
     took: float
     psnr: float | None
     same: bool
@@ -467,7 +465,6 @@ class PointAnswer(TypedDict):
     words: str
     shape: Shape
     distance: float | None
-    brightest: float
     outside: float
     remark: str | None
 

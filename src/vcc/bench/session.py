@@ -406,7 +406,6 @@ class Session:
             "channels": channels,
             "photodiodes": (len(parts), len(parts[0])),
             "missing": taken.image.missing_rays,
-            "by_rays": taken.by_rays,
             "took": round(1000 * taken.seconds, 1),
             "psnr": found,
             "same": same,
