@@ -87,6 +87,26 @@ def test_drag_there_and_back_ends_where_it_began(page):
     assert float(page.place("sensor").removesuffix(" mm")) == pytest.approx(52, abs=0.05)
 
 
+def test_escape_takes_back_what_is_dragged(page):
+    page.page.locator("#sensor-z").fill("5.21234567891 cm")  # as it was typed, not as it is drawn
+    page.page.keyboard.press("Enter")
+    page.wait_for_place("sensor", "52.1235 mm")
+    page.settle()
+    x, y = page.middle("sensor")
+    for grip, by in (((x, y), (-40, 0)), (handle(page, "pitch")[1:], (0, 30))):
+        page.page.mouse.move(*grip)
+        page.page.mouse.down()
+        page.page.mouse.move(grip[0] + by[0], grip[1] + by[1], steps=4)
+        page.page.keyboard.press("Escape")
+        page.page.mouse.move(grip[0] + 2 * by[0], grip[1] + 2 * by[1], steps=2)  # which moves nothing
+        page.page.mouse.up()
+        page.settle()
+        sensor = page.page.evaluate("document.querySelector('vcc-bench').bench.document.camera.sensor")
+        assert sensor == {"z": "5.21234567891 cm", "shape": [60, 80], "pitch": "0.25 mm"}
+    page.button("Undo").click()  # the typed place is the one step
+    page.wait_for_place("sensor", "52 mm")
+
+
 def test_drawing_follows_what_is_dragged_over_its_end(page):
     x, y = page.middle("sensor")
     edge = page.page.locator("vcc-bench-side").bounding_box()
@@ -143,6 +163,18 @@ def test_handles_change_diameter_and_focal_length_and_decentre_where_a_hand_take
         page.button("Undo").click()
         page.settle()
     assert page.page.locator("#elements-0-diameter").input_value() == "18"
+    page.page.locator("#elements-0-focal_length").fill("200")  # focuses far behind the drawing
+    page.page.keyboard.press("Enter")
+    page.settle()
+    edge = page.page.locator("vcc-bench-side").bounding_box()
+    _, x, y = handle(page, "focal length")
+    assert x < edge["x"] + edge["width"]
+    page.page.mouse.move(x, y)
+    page.page.mouse.down()
+    page.page.mouse.move(x - 30, y, steps=4)
+    page.page.mouse.up()
+    page.settle()
+    assert 190 < float(page.page.locator("#elements-0-focal_length").input_value()) < 200
 
 
 def test_handles_are_worked_by_keys_and_the_sensor_has_them_too(page):

@@ -127,6 +127,31 @@ def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page
     page.wait_for_place("sensor", "52.99 mm")
 
 
+def test_arrow_keys_in_a_field_are_one_movement_and_escape_takes_it_back(page):
+    field = page.page.locator("#sensor-z")
+    # Between two keys the field is drawn again; they take 0.8 s in all, and a pause is 0.5 s.
+    field.evaluate(
+        """async (field) => {
+            for (const held of [{}, {}, { shiftKey: true }, { altKey: true }]) {
+                field.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowUp", ...held }));
+                await new Promise((later) => setTimeout(later, 200));
+            }
+            await new Promise((later) => setTimeout(later, 600));
+        }"""
+    )
+    assert page.place("sensor") == "64.1 mm"
+    page.settle()
+    page.button("Undo").click()
+    page.wait_for_place("sensor", "52 mm")
+    field.press("ArrowUp")
+    page.wait_for_place("sensor", "53 mm")
+    field.press("Escape")
+    page.wait_for_place("sensor", "52 mm")
+    page.page.wait_for_timeout(600)
+    assert page.place("sensor") == "52 mm"
+    assert page.button("Undo").is_disabled()
+
+
 def focused(page):
     """How what has the focus is called."""
     return page.page.evaluate(
@@ -176,7 +201,7 @@ def test_places_are_typed_with_their_units_and_what_is_no_length_is_refused_at_i
     assert field.input_value() == "4.85"  # as it was typed, and its unit behind it
     unit = page.page.locator("#sensor-z + .unit")
     assert unit.text_content() == "cm"
-    for typed, said in (("1e400 mm", "a finite number"), ("53 kg", "not a length")):
+    for typed, said in (("1e400", "a finite number"), ("1e400 mm", "a finite number"), ("53 kg", "not a length")):
         field.fill(typed)
         page.page.keyboard.press("Enter")
         page.page.get_by_role("alert").get_by_text(said).wait_for()
@@ -187,6 +212,10 @@ def test_places_are_typed_with_their_units_and_what_is_no_length_is_refused_at_i
     page.page.keyboard.press("Enter")
     page.wait_for_place("sensor", "52.5 mm")
     assert unit.text_content() == "mm"
+    page.page.locator("#sensor-decentre").fill("0.5, 0")
+    page.page.keyboard.press("Enter")
+    page.settle()
+    assert page.page.locator("#sensor-decentre").input_value() == "0.5 mm, 0 mm"  # not metres
 
 
 def test_elements_are_added_edited_and_removed(page):
@@ -203,6 +232,11 @@ def test_elements_are_added_edited_and_removed(page):
     page.page.locator(".grid i").first.click()  # a cell of the drawn pattern
     page.settle()
     assert page.page.locator("#elements-1-pattern-cells").input_value().split() == ["0", "0", "0", "1"]
+    page.page.get_by_label("Add an element").select_option("achromat-100mm")
+    surfaces = page.page.get_by_role("region", name="surfaces").locator("tr")
+    surfaces.first.wait_for()
+    assert surfaces.count() == 4  # their names, and three
+    assert "{" not in surfaces.nth(1).text_content()
 
 
 def test_address_holds_the_camera_for_another_window_and_for_a_reload(page, browser, served):
@@ -220,6 +254,10 @@ def test_address_holds_the_camera_for_another_window_and_for_a_reload(page, brow
     assert page.place("sensor") == "50.5 mm"  # a window has a camera of its own
     page.page.reload()
     page.wait_for_place("sensor", "50.5 mm")
+    cut = Page(browser, served.address + "#d=" + page.page.url.partition("#d=")[2][:40])
+    cut.page.get_by_text("is cut or damaged: copy the whole address again").wait_for()
+    assert cut.place("sensor") == "52 mm"
+    cut.close()
 
 
 def test_server_goes_and_comes_back_and_the_camera_is_still_there(page, served):

@@ -25,7 +25,7 @@ from vcc.bench import imaging as imaging_there
 from vcc.bench import offered as offered_there
 from vcc.bench import picture as picture_there
 from vcc.bench import session as session_there
-from vcc.bench.additions import FROM_FILES
+from vcc.bench.additions import FROM_FILES, families
 from vcc.bench.document import Document
 from vcc.bench.inbox import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.bench.offered import Field
@@ -157,6 +157,11 @@ def test_kind_that_comes_from_a_file_is_not_added_and_the_way_out_is_named(clien
 
 
 def test_a_real_lens_is_added_by_name_with_its_surfaces(client):
+    client.do("add", kind="aspheric-14mm")
+    words = client.until("refused")[0]["words"]
+    assert "is 105.1 mm long, and the widest gap of this camera is 26 mm" in words
+    assert "move the sensor to z = 132 mm or further" in words  # 26 mm, where the mask stands, and 105.1 mm
+    client.until("state")
     client.do("add", kind="phone-4mm", z=None)
     state, _ = client.until("state", "refused")
     assert state["is"] == "state", state
@@ -172,6 +177,28 @@ def test_each_kind_can_be_added_and_drawn(client, kind):
     drawn = state["side"]["elements"][2]
     assert (drawn["element"], drawn["kind"]) == (2, kind.replace("_", " "))
     assert state["document"]["camera"]["elements"][2]["name"]
+    client.do("add", kind=kind)  # where it makes sense: there, too, it is accepted
+    state = answered(client)
+    assert len(state["document"]["camera"]["elements"]) == 4, state
+
+
+def answered(client):
+    """What is told of a change: its state, or why it is refused; not what was done besides."""
+    answer, _ = client.until("state", "refused")
+    return answered(client) if answer.get("done") else answer
+
+
+@pytest.mark.parametrize("where", [["sensor", "angular_response"], ["elements", 2, "pattern", "pattern"]])
+def test_a_pattern_chosen_by_name_gets_what_it_needs_wherever_it_is(client, where):
+    client.do("add", kind="mask", z="13 mm")
+    client.do("set", where=["elements", 2, "pattern"], value={"name": "bounded"})
+    assert answered(client)["is"] == answered(client)["is"] == "state"
+    patterns = [each["kind"] for each in families()["pattern"] if not each.get("cells")]
+    assert "circle" in patterns
+    for name in patterns:
+        client.do("set", where=where, value={"name": name})
+        answer = answered(client)
+        assert answer["is"] == "state", answer
 
 
 def test_pictures_are_compared_with_the_pinned_one(client):
@@ -584,6 +611,9 @@ def test_glass_gets_wavelengths_by_itself_and_each_band_its_own_picture(client):
     state, _ = client.until("state", "refused")
     assert state["document"]["wavelengths"] == ["610 nm", "540 nm", "465 nm"]
     assert state["bands"] == pytest.approx([610e-9, 540e-9, 465e-9])
+    remark = client.until("refused", "picture")[0]
+    assert remark["done"]
+    assert "wavelengths 610 nm, 540 nm, 465 nm, because" in remark["words"]
     message = client.at_rest()
     assert (message["is"], message["turn"]) == ("picture", 2), message
     field = noise().with_wavelengths([610e-9, 540e-9, 465e-9])

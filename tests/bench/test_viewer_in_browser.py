@@ -58,6 +58,13 @@ def test_pointer_reads_values_and_the_place_on_the_sensor(page):
     page.page.get_by_text("column 40, row 30").wait_for()
     # The pixel right of the middle and below it, as seen; the sensor's image is inverted: half a pitch of 0.25 mm.
     page.page.get_by_text("x -0.125 mm, y -0.125 mm").wait_for()
+    page.page.get_by_role("checkbox", name="Noise").check()
+    page.page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + box["height"] / 2)
+    reading = page.page.locator(".line [role=status]", has_text="DN")
+    reading.wait_for()
+    assert reading.evaluate(
+        "of => of.scrollWidth <= of.clientWidth && of.scrollHeight <= of.parentElement.clientHeight"
+    )
 
 
 def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):
@@ -187,6 +194,8 @@ def test_places_in_fields_and_drawing_agree_while_the_server_is_away(page, serve
     drawn = page.place("sensor")
     assert drawn != "52 mm"
     assert page.page.locator("#sensor-z").input_value() == drawn.removesuffix(" mm")
+    page.page.get_by_label("Add an element").select_option("diffuser")
+    page.page.get_by_text("This was not done, because there is no connection").wait_for()
     served.start()
     page.page.get_by_text("The server is gone").wait_for(state="detached")
     page.settle()

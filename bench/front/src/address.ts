@@ -15,16 +15,12 @@ export async function written(document: BenchDocument): Promise<string> {
   return "#d=" + btoa(letters).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
 }
 
-/** The document of an address's fragment; null where there is none, or what is there is none. */
+/** The document of an address's fragment; null where there is none. An error where it is damaged. */
 export async function read(fragment: string): Promise<BenchDocument | null> {
-  const found = /^#d=([\w-]+)$/.exec(fragment);
+  const found = /^#d=(.*)$/.exec(fragment);
   if (!found) return null;
-  try {
-    const letters = atob(found[1]!.replaceAll("-", "+").replaceAll("_", "/"));
-    const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
-    const json = await through(bytes, new DecompressionStream("deflate-raw"));
-    return JSON.parse(new TextDecoder().decode(json)) as BenchDocument;
-  } catch {
-    return null;
-  }
+  const letters = atob(found[1]!.replaceAll("-", "+").replaceAll("_", "/"));
+  const bytes = Uint8Array.from(letters, (letter) => letter.charCodeAt(0));
+  const json = await through(bytes, new DecompressionStream("deflate-raw"));
+  return JSON.parse(new TextDecoder().decode(json)) as BenchDocument;
 }

@@ -168,12 +168,21 @@ export class Bench extends EventTarget {
   }
 
   act(message: { do: string } & { [name: string]: unknown }, buffers?: ArrayBuffer[]): void {
+    if (!this.heardOf()) return;
     this.remark = null; // of what was done before
     window.clearTimeout(this.restTimer);
     this.next = null;
     this.settle();
     this.ask(message, buffers);
     this.changed();
+  }
+
+  /** Whether the host hears what is asked now, or later; otherwise this is said. */
+  private heardOf(): boolean {
+    const heard = this.open || this.silent;
+    if (!heard) this.refused = { words: "This was not done, because there is no connection. Values that you change meanwhile are sent when it is back.", where: null };
+    this.changed();
+    return heard;
   }
 
   /** The host finds a place that suits the kind, unless one is given. */
@@ -205,7 +214,7 @@ export class Bench extends EventTarget {
   }
 
   export(what: string, options: object = {}): void {
-    this.host.send({ do: "export", what, ...options });
+    if (this.heardOf()) this.host.send({ do: "export", what, ...options });
   }
 
   /** Change how the picture is shown. */
@@ -216,7 +225,7 @@ export class Bench extends EventTarget {
   }
 
   pin(): void {
-    this.host.send({ do: "pin" });
+    if (this.heardOf()) this.host.send({ do: "pin" });
   }
 
   unpin(number?: number): void {
@@ -228,6 +237,7 @@ export class Bench extends EventTarget {
   }
 
   scrub(options: object): void {
+    if (!this.heardOf()) return;
     this.frames = null;
     this.question("scrub", options);
   }
@@ -296,8 +306,9 @@ export class Bench extends EventTarget {
     this.settle();
     this.valueUnderway = false;
     if (this.open) {
-      const document = this.document ?? (this.options.address ? await read(window.location.hash) : null);
-      this.ask({ do: "hello", ...(document ? { document } : {}) });
+      const document = this.document ?? (this.options.address ? await this.inAddress() : null);
+      this.ask({ do: "hello", ...(document instanceof Error ? {} : { document }) });
+      if (document instanceof Error) this.refused = { words: document.message, where: null };
       if (JSON.stringify(this.look) !== PLAIN) this.host.send({ do: "look", look: this.look, turn: this.turn });
     } else {
       this.progress = null;
@@ -346,7 +357,7 @@ export class Bench extends EventTarget {
         await this.hearAnswer(message, buffers);
         break;
       case "file":
-        if (buffers[0]) saved(message.name, message.type, buffers[0]);
+        if (buffers[0]) saved(message.name, new Blob([bytesOf(buffers[0])], { type: message.type }));
         this.progress = null;
         break;
       case "refused":
@@ -503,9 +514,19 @@ export class Bench extends EventTarget {
   }
 
   private readonly addressChanged = async (): Promise<void> => {
-    const document = await read(window.location.hash);
-    if (document) this.act({ do: "load", document });
+    const document = await this.inAddress();
+    if (document instanceof Error) this.refused = { words: document.message, where: null };
+    else if (document) this.act({ do: "load", document });
+    this.changed();
   };
+
+  private async inAddress(): Promise<BenchDocument | Error | null> {
+    try {
+      return await read(window.location.hash);
+    } catch {
+      return new Error(`The camera in this address, ${window.location.hash.slice(0, 16)}…, is cut or damaged: copy the whole address again. The bench shows ${this.document ? "the camera of before" : "the one that it was started with"}.`);
+    }
+  }
 }
 
 /** The document with another value in one place, all else shared with it; null takes away. */
@@ -545,8 +566,8 @@ async function decoded(view: DataView): Promise<ImageBitmap> {
   return createImageBitmap(image);
 }
 
-function saved(name: string, type: string, view: DataView): void {
-  const address = URL.createObjectURL(new Blob([bytesOf(view)], { type }));
+export function saved(name: string, file: Blob): void {
+  const address = URL.createObjectURL(file);
   const link = document.createElement("a");
   link.href = address;
   link.download = name;

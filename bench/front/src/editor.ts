@@ -184,6 +184,11 @@ export class EditorView extends Part {
       .cells { display: grid; gap: 6px; max-width: 260px; padding: 4px 0; }
       .grid { display: grid; gap: 1px; justify-content: start; border: 1px solid var(--line); background: var(--line); width: max-content; }
       .grid i { cursor: pointer; }
+      .field:has(.list) { grid-template-columns: 1fr; }
+      .list { overflow-x: auto; }
+      table { border-collapse: collapse; font-size: 12px; }
+      th { font-weight: 400; color: var(--quiet); }
+      th, td { padding: 2px 10px 2px 0; text-align: start; white-space: nowrap; }
     `,
   ];
 }

@@ -13,6 +13,8 @@ const CHECKERED = [[1, 0, 1, 0, 1], [0, 1, 0, 1, 0], [1, 0, 1, 0, 1], [0, 1, 0, 
 /** Of cells with more rows or columns than this only their number is shown. */
 const MOST_DRAWN = 33;
 const PAUSE = 500;
+/** Fields that arrow keys change: when that ends, and the value of before. A field outlives the functions of one rendering. */
+const moved = new WeakMap<HTMLInputElement, { timer: number; from: Value }>();
 /** What a part is, before how it is called and where off the axis it stands. */
 const FIRST = ["z"];
 const LAST = ["name", "decentre"];
@@ -54,8 +56,28 @@ function input(bench: Bench, parameter: Parameter, value: Value, where: Where): 
   }
   if (takes.includes("array")) return cells(bench, value, where, id);
   if (isTable(value) || (Array.isArray(value) && value.some((each) => typeof each === "object")))
-    return html`<output id=${id} class="quiet">${inWords(value)}</output>`;
+    return listed(value, id, parameter.name);
   return words(bench, parameter, value, where);
+}
+
+/** What has no fields: the surfaces of a lens as a table, numbers in several dimensions by their count. */
+function listed(value: Value, id: string, name: string): TemplateResult {
+  const rows = Array.isArray(value) ? value.filter(isTable) : [];
+  if (!rows.length || rows.length < (value as Value[]).length) {
+    const counts: number[] = [];
+    for (let at: Value | undefined = value; Array.isArray(at); at = at[0]) counts.push(at.length);
+    return html`<output id=${id} class="quiet">${counts.length > 1 ? `${counts.join(" × ")} numbers` : inWords(value)}</output>`;
+  }
+  const names = [...new Set(rows.flatMap((row) => Object.keys(row).filter((name) => !isTable(row[name]!))))];
+  return html`<div id=${id} class="list" role="region" tabindex="0" aria-label=${name}><table><tr>${names.map((name) => html`<th>${name.replaceAll("_", " ")}</th>`)}</tr>
+    ${rows.map((row) => html`<tr>${names.map((name) => html`<td>${short(row[name] ?? null)}</td>`)}</tr>`)}</table></div>`;
+}
+
+/** A value in a table that is read, not typed. */
+function short(value: Value): string {
+  if (value === true) return "yes";
+  if (value === false) return "no";
+  return Array.isArray(value) ? value.map((each) => (typeof each === "number" ? String(Number(each.toPrecision(4))) : inWords(each))).join(", ") : shortened(inWords(value));
 }
 
 /** Numbers, with their units, and words. */
@@ -64,11 +86,10 @@ function words(bench: Bench, parameter: Parameter, value: Value, where: Where): 
   const hint = parameter.needed ? "" : parameter.default === null || parameter.default === "" ? "none" : inWords(parameter.default);
   const scalar = parameter.unit !== null && !Array.isArray(before) && !parameter.takes.includes("list");
   const moves = parameter.takes.some((each) => each === "number" || each === "whole number");
-  let timer = 0;
   const changed = (event: Event) => {
     const box = event.target as HTMLInputElement;
     delete box.dataset["edited"];
-    window.clearTimeout(timer);
+    stop(box);
     const next = box.value.trim() === "" ? null : asValue(parameter, box.value, before);
     // What is shown is shortened: as long as nothing else was typed the value stays as exact as it is.
     if (box.value !== shownIn(value, scalar) && inWords(next) !== inWords(value)) bench.set(where, next);
@@ -77,7 +98,9 @@ function words(bench: Bench, parameter: Parameter, value: Value, where: Where): 
   const key = (event: KeyboardEvent) => {
     const box = event.target as HTMLInputElement;
     if (event.key === "Escape") {
-      box.value = shownIn(value, scalar);
+      const moving = stop(box);
+      if (moving) bench.set(where, moving.from);
+      box.value = shownIn(moving ? moving.from : value, scalar);
       delete box.dataset["edited"];
       bench.forgive();
     }
@@ -85,19 +108,36 @@ function words(bench: Bench, parameter: Parameter, value: Value, where: Where): 
     if (!by || !moves) return;
     const from = box.value ? inWords(asValue(parameter, box.value, before)) : inWords(parameter.default);
     const whole = parameter.takes.includes("whole number") && !parameter.takes.includes("number");
-    const moved = whole ? String(Number(from) + by) : stepped(from, by * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1));
-    if (moved === null) return;
+    const typed = whole ? String(Number(from) + by) : stepped(from, by * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1));
+    if (typed === null) return;
     event.preventDefault();
-    const next = asValue(parameter, moved, before);
+    const next = asValue(parameter, typed, before);
     box.value = shownIn(next, scalar);
     bench.set(where, next, true);
-    window.clearTimeout(timer);
-    timer = window.setTimeout(() => bench.set(where, next), PAUSE);
+    const began = stop(box);
+    const timer = window.setTimeout(() => {
+      moved.delete(box);
+      bench.set(where, next);
+    }, PAUSE);
+    moved.set(box, { timer, from: began ? began.from : value });
   };
   const box = html`<input id=${where.join("-")} type="text" inputmode=${parameter.takes.includes("text") ? "text" : "decimal"} autocomplete="off" spellcheck="false"
     .value=${shownIn(value, scalar)} title=${inWords(value)} placeholder=${scalar ? shownIn(parameter.default, true) || hint : hint} @input=${(event: Event) => ((event.target as HTMLInputElement).dataset["edited"] = "")}
     @change=${changed} @keydown=${key}>`;
-  return scalar ? html`<span class="quantity">${box}<span class="unit">${unitOf(before) || UNITS[parameter.unit!]}</span></span>` : box;
+  return scalar ? html`<span class="quantity">${box}<span class="unit">${unitOf(before) || usualUnit(parameter)}</span></span>` : box;
+}
+
+/** End what arrow keys change in a field, without a word to the host. */
+function stop(box: HTMLInputElement): { from: Value } | undefined {
+  const began = moved.get(box);
+  window.clearTimeout(began?.timer);
+  moved.delete(box);
+  return began;
+}
+
+/** The unit of a bare number in a field that has none yet. */
+function usualUnit({ name, unit }: Parameter): string {
+  return name.includes("wavelength") ? "nm" : (UNITS[unit as keyof typeof UNITS] ?? "");
 }
 
 /** The unit that a bare number gets, as it is shown behind the field. */
@@ -129,7 +169,7 @@ function familyField(bench: Bench, parameter: Parameter, family: Kind[], value: 
   const drawable = parameter.family === "pattern" && parameter.takes.includes("array");
   const chosen = table ? String(table["name"] ?? "") : rows ? DRAWN : typeof value === "string" ? value : Array.isArray(value) ? `${value.length} together` : "";
   const kind = family.find((each) => each.kind === chosen);
-  const known = [...family.map((each) => each.kind), ...(drawable ? [DRAWN, FROM_FILE] : [])];
+  const known = [...family.filter((each) => drawable || !each.cells).map((each) => each.kind), ...(drawable ? [DRAWN, FROM_FILE] : [])];
   const choose = (event: Event) => {
     const select = event.target as HTMLSelectElement;
     const name = select.value;
@@ -158,10 +198,11 @@ async function upload(bench: Bench, where: Where, input: HTMLInputElement): Prom
 
 /** Rows of numbers as text, and as cells to be clicked on and off. */
 function cells(bench: Bench, value: Value, where: Where, id: string): TemplateResult {
+  if (Array.isArray(value) && !isRows(value)) return listed(value, id, String(where.at(-1)));
   const grid = isRows(value) ? value : null;
   const columns = grid?.[0]?.length ?? 0;
   if (!grid || grid.length > MOST_DRAWN || columns > MOST_DRAWN)
-    return html`<output id=${id} class="quiet">${grid ? `${grid.length} × ${columns} numbers` : inWords(value) || "none"}</output>`;
+    return html`<output id=${id} class="quiet">${grid ? `${grid.length} × ${columns} numbers` : "none"}</output>`;
   const flip = (row: number, column: number) =>
     bench.set(where, grid.map((each, at) => (at === row ? each.map((cell, place) => (place === column ? (cell > 0.5 ? 0 : 1) : cell)) : each)));
   const side = Math.max(5, Math.min(18, Math.floor(180 / columns)));
@@ -199,7 +240,7 @@ function asValue(parameter: Parameter, typed: string, before: Value): Value {
   if (takes.includes("list") && typed.includes(","))
     return typed.split(",").map((each, at) => asValue({ ...parameter, takes: ["number"] }, each, Array.isArray(before) ? (before[at] ?? null) : before));
   const text = typed.trim();
-  if (unit) return withUnit(text, Array.isArray(before) ? (before[0] ?? null) : before, UNITS[unit]);
+  if (unit) return withUnit(text, Array.isArray(before) ? (before[0] ?? null) : before, usualUnit(parameter));
   const number = Number(text.replace("−", "-"));
   const numeric = takes.some((each) => each !== "text" && each !== "name");
   return numeric && text !== "" && Number.isFinite(number) ? number : text;

@@ -19,6 +19,8 @@ interface Range {
 export interface Mapping extends Scale {
   z(x: number): number;
   height(y: number): number;
+  left: number;
+  right: number;
 }
 
 export class Frame {
@@ -57,6 +59,8 @@ export class Frame {
       z: (x) => middle.z + (x - x0) / across,
       y: (metres) => y0 - (metres - middle.height) * up,
       height: (y) => middle.height + (y0 - y) / up,
+      left: MARGIN.left,
+      right: width - MARGIN.right / 2,
       top: MARGIN.top,
       bottom: height - MARGIN.bottom,
       thick: Math.min(Math.max(0.016 * inner.width * Math.sqrt(this.zoom), 4), 22),

@@ -15,6 +15,8 @@ export interface Held {
   handle: Handle;
   where: Where;
   value: number;
+  /** What the document had when it began. */
+  from: Value;
   /** Of the pointer when it began, pixels. */
   x: number;
   y: number;
@@ -28,9 +30,10 @@ export function handlesOf(bench: Bench): Handle[] {
   return (selected === "sensor" ? bench.side?.sensor.handles : bench.side?.elements[selected]?.handles) ?? [];
 }
 
+/** Of a handle; one that lies outside of the drawing stands at its border. */
 export function placeOf(bench: Bench, handle: Handle, scale: Mapping): { x: number; y: number } {
-  const z = bench.placeOf(bench.selected) + handle.z;
-  return { x: scale.x(z), y: Math.min(Math.max(scale.y(handle.height), scale.top - 2), scale.bottom + 2) };
+  const x = scale.x(bench.placeOf(bench.selected) + handle.z);
+  return { x: handle.z ? Math.min(Math.max(x, scale.left), scale.right) : x, y: Math.min(Math.max(scale.y(handle.height), scale.top - 2), scale.bottom + 2) };
 }
 
 /** The parameter's value as a document has it, after the pointer has moved. */

@@ -50,13 +50,14 @@ export function short(length: number, digits = 4): string {
 }
 
 /**
- * What was typed, with the unit of the value before where none was typed: "41.5" becomes "41.5 mm". What no number holds
- * ("1e400 mm") goes as it was typed, and the host says what is wrong.
+ * What was typed, with the unit of the value before where none was typed: "41.5" becomes "41.5 mm". Digits that no number
+ * holds ("1e400") stay as they were typed, and the host says what is wrong.
  */
 export function withUnit(typed: string, before: unknown, otherwise: string): string {
   const parts = split(typed);
-  if (!parts || !Number.isFinite(parts.number)) return typed;
+  if (!parts) return typed;
   const unit = parts.unit || (typeof before === "string" && split(before)?.unit) || otherwise;
+  if (!Number.isFinite(parts.number)) return parts.unit ? typed : `${typed} ${unit}`;
   return `${parts.number}${unit ? ` ${unit}` : ""}`;
 }
 

@@ -52,12 +52,12 @@ export const controls = css`
     box-sizing: border-box;
   }
   *, *::before, *::after { box-sizing: border-box; }
-  button, select, input, textarea, summary, .button {
+  button, select, input, textarea, summary {
     font: inherit;
     font-variant-numeric: tabular-nums;
     color: inherit;
   }
-  button, select, summary, .button {
+  button, select, summary {
     height: 28px;
     padding: 0 9px;
     border: 1px solid transparent;
@@ -73,7 +73,7 @@ export const controls = css`
   }
   summary::-webkit-details-marker { display: none; }
   select { appearance: none; padding-right: 22px; background: var(--arrow) no-repeat right 8px center; }
-  button:hover:not(:disabled), select:hover, summary:hover, .button:hover { background-color: var(--hover); }
+  button:hover:not(:disabled), select:hover, summary:hover { background-color: var(--hover); }
   button:disabled { color: var(--faint); cursor: default; }
   button[aria-pressed="true"], button[aria-selected="true"] { background: var(--chosen); color: var(--accent); }
   .icon { padding: 0; width: 28px; }

@@ -3,6 +3,7 @@
 import { html, css, nothing } from "lit";
 
 import { answerStyles } from "./answers";
+import { saved } from "./bench";
 import { drawPictures, type Compare } from "./canvas";
 import { plain, short } from "./numbers";
 import { Part, controls } from "./part";
@@ -284,15 +285,7 @@ export class PictureView extends Part {
 
   private saveAsShown(): void {
     this.canvas.toBlob((blob) => {
-      if (!blob) return;
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(blob);
-      link.download = "as-shown.png";
-      link.hidden = true;
-      document.body.append(link);
-      link.click();
-      link.remove();
-      window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+      if (blob) saved("as-shown.png", blob);
     });
   }
 
@@ -404,7 +397,7 @@ export class PictureView extends Part {
           @input=${(event: Event) => (this.wipe = Number((event.target as HTMLInputElement).value))}>` : nothing}
       </div>
       ${bench.pins.length ? html`<vcc-bench-pins .bench=${bench}></vcc-bench-pins>` : nothing}
-      <div class="line">${this.reading()}<span class="spring"></span>${this.state()}</div>`;
+      <div class="line ${bench.document?.noise ? "two" : ""}">${this.reading()}<span class="spring"></span>${this.state()}</div>`;
   }
 
   private pin(): void {
@@ -507,9 +500,12 @@ export class PictureView extends Part {
       .wipe { position: absolute; left: 0; right: 0; bottom: 6px; width: 100%; margin: 0; accent-color: var(--accent); pointer-events: none; opacity: 0; }
       .wipe:focus-visible { opacity: 1; }
       canvas.wiping { cursor: ew-resize; }
-      .line { display: flex; gap: 14px; min-height: 26px; align-items: center; padding: 0 10px; font-size: 12px; color: var(--quiet); white-space: nowrap; overflow: hidden; }
-      .line > span { overflow: hidden; text-overflow: ellipsis; white-space: pre; }
+      .line { display: flex; gap: 14px; height: 26px; align-items: center; padding: 0 10px; font-size: 12px; line-height: 1.3; color: var(--quiet); }
+      .line > span { white-space: nowrap; }
+      .line > [role="status"] { white-space: pre-wrap; }
+      .line.two { height: 40px; }
       .line > .missing { color: var(--warn-ink); }
+      @container (max-width: 640px) { .line { height: 40px; } .line.two { height: 56px; } }
       @container (max-width: 740px) { .short { display: inline; } .long { display: none; } }
       @container (max-width: 540px) { .bar { gap: 2px; padding: 6px 4px; } button { padding: 0 6px; } label.check { gap: 5px; } .icon { width: 26px; padding: 0; } }
     `,

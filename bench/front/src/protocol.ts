@@ -47,11 +47,12 @@ export interface Parameter {
   parameters?: Parameter[];
 }
 
-/** A kind of element or pattern; of elements, whether a bench can add one. */
+/** A kind of element or pattern. */
 export interface Kind {
   kind: string;
   words: string;
   addable?: boolean;
+  cells?: boolean;
   parameters: Parameter[];
 }
 
@@ -297,8 +298,6 @@ export interface PictureMessage {
   photodiodes: [number, number];
   /** Share of the rays that the light field lacks. */
   missing: number;
-  /** Whether rays were traced. */
-  by_rays: boolean;
   /** Milliseconds. */
   took: number;
   /** Against the reference pin, dB. */
@@ -377,7 +376,6 @@ export interface PointAnswer {
   words: string;
   shape: [number, number];
   distance: number | null;
-  brightest: number;
   outside: number;
   remark: string | null;
 }

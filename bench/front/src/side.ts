@@ -8,7 +8,7 @@ import { asValue, drawnHandle, handlesOf, inWords, placeOf, valueAt, type Held }
 import { drawnDistances, drawnLabels } from "./labels";
 import { axisStep, inMillimetres, short } from "./numbers";
 import { Part, controls } from "./part";
-import type { Handle, Side, Snap, Where } from "./protocol";
+import type { Handle, Side, Snap, Table, Value, Where } from "./protocol";
 import { drawnRays, legend } from "./rays";
 import { drawn, drawnAperture, drawnSensor, type Scale } from "./shapes";
 import { sign } from "./signs";
@@ -34,7 +34,9 @@ interface Drag {
   which: Selected;
   /** Pointer's place minus the part's when it began, pixels. */
   grip: number;
+  /** Where the part stood when it began: metres, and as the document had it. */
   from: number;
+  written: Value;
   z: number;
   /** Places to which it is pulled, as they were when it began. */
   snaps: Snap[];
@@ -173,7 +175,8 @@ export class SideView extends Part {
     }
     const handle = this.handleAt(event, point);
     if (handle) {
-      this.held = { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value: handle.value, ...point, moved: false };
+      this.held = this.hold(handle, point);
+      this.renderRoot.querySelector<SVGElement>(`[data-handle="${handle.words}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
       event.preventDefault();
       return;
     }
@@ -183,7 +186,7 @@ export class SideView extends Part {
       return;
     }
     const z = this.bench.placeOf(which);
-    this.drag = { which, grip: point.x - this.mapping().x(z), from: z, z, snaps: this.snapsOf(which), snap: null, moved: false };
+    this.drag = { which, grip: point.x - this.mapping().x(z), from: z, written: this.written(which), z, snaps: this.snapsOf(which), snap: null, moved: false };
     const again = this.bench.selected === which;
     this.bench.select(which);
     this.renderRoot.querySelector<SVGElement>(`[data-part="${which}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
@@ -219,6 +222,17 @@ export class SideView extends Part {
   /** Places of the hand that come before the browser's next frame, where it tells them: an image is asked for at once. */
   private moveRaw(event: PointerEvent): void {
     if ((this.drag || this.held) && this.pointers.size === 1) this.move(event);
+  }
+
+  private hold(handle: Handle, point = { x: 0, y: 0 }): Held {
+    const table = this.bench.tableOf(this.bench.selected);
+    const from = handle.where.reduce<Value>((at, step) => (at as Table | null)?.[step] ?? null, table ?? null);
+    return { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value: handle.value, from, ...point, moved: false };
+  }
+
+  /** The place of a part as the document has it. */
+  private written(which: Selected): Value {
+    return this.bench.tableOf(which)?.["z"] ?? "0 mm";
   }
 
   private moveHandle(held: Held, point: { x: number; y: number }): void {
@@ -264,6 +278,16 @@ export class SideView extends Part {
     if (held?.moved) this.bench.set(held.where, asValue(held.handle, held.value).words);
   }
 
+  /** End a movement, by the pointer or by keys, as if it had not begun. */
+  private takeBack(): void {
+    const { drag, held } = this;
+    window.clearTimeout(this.keyTimer);
+    this.panning = false;
+    this.drag = this.held = null;
+    if (drag?.moved) this.bench.set([...this.bench.whereOf(drag.which), "z"], drag.written);
+    if (held?.moved) this.bench.set(held.where, held.from);
+  }
+
   private snapsOf(which: Selected): Snap[] {
     if (which === "sensor") return this.bench.side?.snaps ?? [];
     return (which === "light field" ? this.bench.side?.aperture?.snaps : this.bench.side?.elements[which]?.snaps) ?? [];
@@ -284,8 +308,8 @@ export class SideView extends Part {
       event.preventDefault();
       const step = axisStep(this.frame.length / this.frame.zoom) * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1);
       const z = this.bench.placeOf(which) + by * step;
-      const from = this.drag?.from ?? this.bench.placeOf(which);
-      this.drag = { which, grip: 0, from, z: Math.round(z / (step / 10)) * (step / 10), snaps: [], snap: null, moved: true };
+      const { from, written } = this.drag ?? { from: this.bench.placeOf(which), written: this.written(which) };
+      this.drag = { which, grip: 0, from, written, z: Math.round(z / (step / 10)) * (step / 10), snaps: [], snap: null, moved: true };
       this.bench.set([...this.bench.whereOf(which), "z"], inMillimetres(this.drag.z), true);
       this.frame.reach(this.drag.z, this.width, this.height);
       this.waitForKeys();
@@ -295,9 +319,6 @@ export class SideView extends Part {
     } else if ((event.key === "Delete" || event.key === "Backspace") && typeof which === "number") {
       this.bench.act({ do: "remove", element: which });
       event.preventDefault();
-    } else if (event.key === "Escape" && this.drag) {
-      this.drag = { ...this.drag, z: this.drag.from };
-      this.keysDone();
     }
   }
 
@@ -307,9 +328,9 @@ export class SideView extends Part {
     event.preventDefault();
     event.stopPropagation();
     const size = handle.words === "decentre" ? axisStep(this.frame.length) : handle.unit === "angle" ? Math.PI / 180 : 0.02 * Math.abs(handle.value);
-    const from = this.held?.handle.words === handle.words ? this.held.value : handle.value;
-    const { value, words } = asValue(handle, from + by * size * (event.shiftKey ? 5 : event.altKey ? 0.2 : 1));
-    this.held = { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value, x: 0, y: 0, moved: true };
+    const held = this.held?.handle.words === handle.words ? this.held : this.hold(handle);
+    const { value, words } = asValue(handle, held.value + by * size * (event.shiftKey ? 5 : event.altKey ? 0.2 : 1));
+    this.held = { ...held, value, moved: true };
     this.bench.set(this.held.where, words, true);
     this.waitForKeys();
   }
@@ -326,6 +347,10 @@ export class SideView extends Part {
   }
 
   private keyOfDrawing(event: KeyboardEvent): void {
+    if (event.key === "Escape" && (this.drag || this.held)) {
+      event.preventDefault();
+      this.takeBack();
+    }
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const x = this.mapping().x(this.bench.placeOf(this.bench.selected));
     const y = (MARGIN.top + this.height - MARGIN.bottom) / 2;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import itertools
 import math
 import os
 import re
@@ -79,7 +78,10 @@ def families() -> Json:
     return {
         noun: [
             *(_kind(name, kind) for name, kind in family.names.items()),
-            *(_kind(name, kind, words=f"A {name.upper()}.") for name, kind in family.arrays.items()),
+            *(
+                _kind(name, kind, words=f"A {name.upper()}.") | {"cells": True}
+                for name, kind in family.arrays.items()
+            ),
         ]
         for noun, family in sorted(found.items())
     }
@@ -144,10 +146,16 @@ def _default(field: Field[Any]) -> Any:
         return None
     unit = unit_of(field)
     if isinstance(field.default, tuple):
-        return [units.text(each, unit) if unit else each for each in field.default]
+        return [_quantity(each, unit) if unit else each for each in field.default]
     if unit is not None and isinstance(field.default, int | float):
-        return units.text(field.default, unit)
+        return _quantity(field.default, unit)
     return field.default if isinstance(field.default, bool | int | float | str) else None
+
+
+def _quantity(value: float, unit: str) -> str:
+    """As text; a zero in the unit that numbers typed after it should have."""
+    zeros = {"length": "0 mm", "angle": "0 deg", "time": "0 ms"}
+    return units.text(value, unit) if value else zeros.get(unit, units.text(value, unit))
 
 
 def _words_of_parameters(kind: type) -> dict[str, str]:
@@ -201,7 +209,15 @@ def _new_real_lens(kind: str, z: Any, train: Train, names: AbstractSet[str]) -> 
     """A lens by name, with its surfaces, in the middle of the widest gap that light meets."""
     lens = _real_lens(kind)
     if z is None:
-        z = _length(max(_suitable_place("real_lens", train) - lens.length / 2, 0.0), 6)
+        low, gap = _widest_gap(train)
+        if lens.length > gap:
+            room = max([0.0, *(one.z + one.length for one in train.elements)]) + lens.length
+            raise InputError(
+                f"{kind} is {_length(lens.length, 4)} long, and the widest gap of this camera is "
+                f"{_length(gap, 4)}: move the sensor to z = {_length(math.ceil(1e3 * room) / 1e3, 6)} or "
+                "further, or remove elements"
+            )
+        z = _length(low + (gap - lens.length) / 2, 6)
     units.parse(z, "length", "z")
     alone = Train([lens], replace(train.sensor, z=lens.length, electronics=None))
     tables, _ = tables_of_train(alone, NOWHERE)
@@ -224,17 +240,26 @@ def _suitable_place(kind: str, train: Train) -> float:
     """
     z = train.sensor.z
     if kind in BEFORE_SENSOR:
-        before = units.parse(_lenslets(train)["focal_length"], "length", "z") if kind == "lens_array" else z / 25
-        return max(z - before, 0.0)
+        if kind == "lens_array":
+            return max(z - units.parse(_lenslets(train)["focal_length"], "length", "z"), 0.0)
+        return z - z / (16 if kind == "louvre" else 25)  # a louvre is z/20 high
     stop = next((one.z for one in train.elements if isinstance(one, Lens | FirstOrder)), None)
     if stop is None:
         stop = next((stage.z for stage in train.stages if np.isfinite(stage.opening[0])), 0.0)
     if kind not in IN_GAPS:
         return min(stop, z)
-    places = sorted({0.0, z, *(end for one in train.elements for end in (one.z, one.z + one.length))})
-    gaps = [(high - low, low) for low, high in itertools.pairwise(places)]
-    widest, low = max(gaps, default=(0.0, 0.0), key=lambda gap: (round(gap[0], 9), -gap[1]))
-    return low + widest / 2
+    low, gap = _widest_gap(train)
+    return low + gap / 2
+
+
+def _widest_gap(train: Train) -> tuple[float, float]:
+    """Where the widest gap between elements, the entrance plane and the sensor begins, and its width, metres."""
+    gaps, end = [], 0.0
+    for start, behind in sorted([(one.z, one.z + one.length) for one in train.elements] + [(train.sensor.z,) * 2]):
+        gaps.append((start - end, end))
+        end = max(end, behind)
+    widest, low = max(gaps, key=lambda gap: (round(gap[0], 9), -gap[1]))
+    return low, widest
 
 
 def _lenslets(train: Train) -> Json:
@@ -269,8 +294,7 @@ def _first_opening(train: Train) -> list[float]:
 
 
 def _length(value: float, digits: int = 3) -> str:
-    """As text; zero in the unit that typed numbers then have."""
-    return units.text(float(f"{value:.{digits}g}"), "length") if value else "0 mm"
+    return _quantity(float(f"{value:.{digits}g}"), "length")
 
 
 _NEW: Mapping[str, Callable[[float, float], Json]] = {
@@ -327,19 +351,26 @@ def made_whole(
     Returns:
         (path, value), in order.
     """
-    inside = isinstance(where, list) and len(where) == 3 and where[0] == "elements" and type(where[1]) is int
-    if not inside or not 0 <= where[1] < len(described.elements):
+    train, number = described.train, _element_of(where, len(described.elements))
+    if number is None and not (isinstance(where, list) and where[:1] == ["sensor"]):
         return [(where, value)]
-    train, z = described.train, described.elements[where[1]].z
-    long, wide = max(train.sensor.z, 1e-3), _width_at(train, z)
+    table = {} if number is None else camera["elements"][number]
+    long = max(train.sensor.z, 1e-3)
+    wide = _width_at(train, train.sensor.z if number is None else described.elements[number].z)
     name = value.get("name") if isinstance(value, dict) else None
     if isinstance(name, str) and len(value) == 1 and name in _CHOSEN:
-        value = value | _CHOSEN[name](long, wide)
-    table = camera["elements"][where[1]]
+        by_slope = number is None or table.get("kind") == "angle_filter"  # 1 m for a slope of 1
+        value = value | _CHOSEN[name](*((1.0, _width_at(train, 0.0) / long) if by_slope else (long, wide)))
     cells = isinstance(value, list) or name == "mura"
-    if where[2] == "pattern" and cells and "width" not in table and table.get("kind") == "mask":
+    if where[2:] == ["pattern"] and cells and "width" not in table and table.get("kind") == "mask":
         return [([*where[:2], "width"], _length(wide, 2)), (where, value)]
     return [(where, value)]
+
+
+def _element_of(where: Any, count: int) -> int | None:
+    """The element of which a path names a parameter."""
+    inside = isinstance(where, list) and len(where) >= 3 and where[0] == "elements" and type(where[1]) is int
+    return where[1] if inside and 0 <= where[1] < count else None
 
 
 def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], str | None]:
@@ -366,7 +397,7 @@ def cells_of(name: Any, buffers: Sequence[bytes]) -> tuple[list[list[float]], st
             values = read_array(file.name, None, True, "the picture", beside)
         except InputError as error:  # it names a file of this function
             words = str(error).replace(f"{file.parent}{os.sep}", "").replace(folder, "").replace(file.name, name)
-            raise InputError(f"{shown(name)}: {words}") from None
+            raise InputError(words.removeprefix("the picture: ")) from None
     if values.ndim == 3:
         values = values.mean(axis=2)
     if values.ndim != 2 or values.size == 0:

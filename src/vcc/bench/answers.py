@@ -29,6 +29,8 @@ MOST_ACROSS = 257
 PHASE_SPACE_RAYS = 60_000
 ONE_PLANE_RAYS, ONE_PLANE_RASTER, FRAME_RAYS = 150_000, (240, 192), 10_000
 """For one larger picture: rays and raster of the picture, and rays to find the extent of all planes."""
+SEEN = 0.001
+"""Share of the light of a point from which a pixel counts as lit."""
 FINER = 8
 """An MTF is computed from the image of a point on pixels this many times finer than the sensor's.
 
@@ -104,14 +106,13 @@ def _psf(message: Json, train: Train, finer: int = 1) -> PointSpread:
 
 
 def _point_spread(found: PointSpread) -> tuple[Json, list[bytes]]:
-    brightest = float(found.values.max())
+    brightest, lit = float(found.values.max()), np.count_nonzero(found.values > SEEN)
     told = {
         "shape": list(found.shape),
         "distance": None if np.isinf(found.distance) else found.distance,
-        "brightest": brightest,
         "outside": found.outside,
-        "words": f"{found.shape[1]}×{found.shape[0]} pixels receive the light of a point; the brightest receives "
-        f"{brightest:.1%} of it",
+        "words": f"{lit} of these {found.shape[1]}×{found.shape[0]} pixels receive more than {SEEN:.1%} of the "
+        f"light of a point; the brightest receives {brightest:.1%}",
     }
     return told, [jpeg(found.values.astype(np.float32), brightest or 1.0)]
 

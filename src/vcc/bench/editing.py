@@ -22,12 +22,14 @@ Json = dict[str, Any]
 
 COLOURS = ("610 nm", "540 nm", "465 nm")
 """Wavelengths that red, green and blue get with the first element that depends on them."""
+COLOURED = f"The light field has got the wavelengths {', '.join(COLOURS)}, because an element depends on them."
 
 
 class Editing:
     """The document of a session, with its history and the camera that it describes.
 
-    Each method that takes a message either puts a valid document, or raises `InputError` and changes nothing.
+    Each method that takes a message either puts a valid document, or raises `InputError` and changes nothing. Some
+    return a remark on what was changed besides.
 
     Args:
         offered: the inputs of the bench.
@@ -119,13 +121,18 @@ class Editing:
         if where == ["sensor", "electronics"] and value is None and changed.noise:
             changed = changed.changed(["noise"], False)
             remark = "Noise requires electronics, and is switched off."
-        self._set(changed, where, value, bool(message.get("moving", False)))
-        return remark
+        return _both(remark, self._set(changed, where, value, bool(message.get("moving", False))))
 
-    def _set(self, changed: Document, where: Any, value: Any, moving: bool = False) -> None:
+    def _set(self, changed: Document, where: Any, value: Any, moving: bool = False) -> str | None:
         for place, each in additions.made_whole(where, value, changed.camera, self.described):
             changed = changed.changed(place, each)
-        self.put(self._with_colours(changed), moving)
+        return self._put_coloured(changed, moving)
+
+    def _put_coloured(self, document: Document, moving: bool = False) -> str | None:
+        """Put a document, with wavelengths if it needs them; return a remark on them."""
+        coloured = self._with_colours(document)
+        self.put(coloured, moving)
+        return None if coloured is document else COLOURED
 
     def add_colours(self) -> str | None:
         """Add wavelengths to a document that needs them, which a file or an address describes; return a remark."""
@@ -137,7 +144,7 @@ class Editing:
         else:
             coloured, self.described = self.checked(coloured)
             self.history = History(coloured)
-        return f"The light field has got the wavelengths {', '.join(COLOURS)}, because an element depends on them."
+        return COLOURED
 
     def _with_colours(self, document: Document) -> Document:
         """With wavelengths of red, green and blue if an element depends on them and the light field has none."""
@@ -153,15 +160,13 @@ class Editing:
     def upload(self, message: Json, buffers: Sequence[bytes]) -> str | None:
         """Use a file as the cells of a pattern; return a remark if it was reduced."""
         cells, remark = additions.cells_of(message.get("name"), buffers)
-        self._set(self.document, message.get("where"), cells)
-        return remark
+        return _both(remark, self._set(self.document, message.get("where"), cells))
 
-    def add(self, message: Json) -> None:
+    def add(self, message: Json) -> str | None:
         """Add an element, at a given place or at one that suits it."""
         entry = additions.new_element(message.get("kind"), message.get("z"), self.train, self._names())
         elements = [*self.document.camera.get("elements", []), entry]
-        added = replace(self.document, camera={**self.document.camera, "elements": elements})
-        self.put(self._with_colours(added))
+        return self._put_coloured(replace(self.document, camera={**self.document.camera, "elements": elements}))
 
     def remove(self, message: Json) -> None:
         """Remove an element."""
@@ -211,7 +216,7 @@ class Editing:
         self.history.redo()
         self.described = self.document.train(self.offered.beside)
 
-    def load(self, message: Json) -> None:
+    def load(self, message: Json) -> str | None:
         """Show a camera from text, from the gallery, or from a document."""
         if "toml" in message:
             if not isinstance(message["toml"], str):
@@ -224,7 +229,7 @@ class Editing:
             document = self.offered.gallery[title]
         else:
             document = Document.of_json(message.get("document"))
-        self.put(self._with_colours(document))
+        return self._put_coloured(document)
 
     def _element(self, message: Json) -> int:
         number = message.get("element")
@@ -235,3 +240,8 @@ class Editing:
 
     def _names(self) -> AbstractSet[str]:
         return {element.name for element in self.described.elements}
+
+
+def _both(one: str | None, other: str | None) -> str | None:
+    """Two remarks as one."""
+    return " ".join(each for each in (one, other) if each) or None

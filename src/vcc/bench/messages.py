@@ -71,11 +71,15 @@ class Parameter(TypedDict):
 
 
 class Kind(TypedDict):
-    """A kind of element or pattern; of elements, whether a bench can add one."""
+    """A kind of element or pattern.
+
+    ``addable``: whether a bench can add such an element; ``cells``: whether such a pattern is an array of cells.
+    """
 
     kind: str
     words: str
     addable: NotRequired[bool]
+    cells: NotRequired[bool]
     parameters: list[Parameter]
 
 
@@ -359,7 +363,6 @@ class PictureMessage(TypedDict):
         channels: of the image; 0 for a grey one.
         photodiodes: rows and columns in a pixel.
         missing: share of the rays that the light field lacks.
-        by_rays: whether rays were traced.
         took: milliseconds.
         psnr: against the reference pin, dB.
         same: whether it equals that.
@@ -375,7 +378,6 @@ class PictureMessage(TypedDict):
     channels: int
     photodiodes: Shape
     missing: float
-    by_rays: bool
     took: float
     psnr: float | None
     same: bool
@@ -463,7 +465,6 @@ class PointAnswer(TypedDict):
     words: str
     shape: Shape
     distance: float | None
-    brightest: float
     outside: float
     remark: str | None
 

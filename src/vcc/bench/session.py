@@ -40,6 +40,8 @@ Send = Callable[[Json, Sequence[bytes]], None]
 
 LINGER = 2.0
 """Seconds that the thread waits for more work before it ends."""
+EDITS = ("add", "remove", "duplicate", "reorder", "undo", "redo", "load")
+"""Messages that are methods of `Editing`, and need nothing else."""
 PAUSE = 0.05
 """Seconds of idleness after which images are rehearsed."""
 
@@ -201,6 +203,8 @@ class Session:
         try:
             if doing == "upload":
                 self._changed_by(message, self._editing.upload(message, buffers))
+            elif doing in EDITS:
+                self._changed_by(message, getattr(self._editing, doing)(message))
             else:
                 getattr(self, f"_do_{doing}")(message)
         except (InputError, MemoryError) as error:
@@ -257,34 +261,6 @@ class Session:
         if moving and rests:  # a hand that holds still sees the whole image, until it moves on
             turn, shown = turn_of(message), self._imaging.is_shown()
             self._wanted = Wanted(turn, moving=not shown, coarse_shown=shown, rests=not shown)
-
-    def _do_add(self, message: Json) -> None:
-        self._editing.add(message)
-        self._changed_by(message)
-
-    def _do_remove(self, message: Json) -> None:
-        self._editing.remove(message)
-        self._changed_by(message)
-
-    def _do_duplicate(self, message: Json) -> None:
-        self._editing.duplicate(message)
-        self._changed_by(message)
-
-    def _do_reorder(self, message: Json) -> None:
-        self._editing.reorder(message)
-        self._changed_by(message)
-
-    def _do_undo(self, message: Json) -> None:
-        self._editing.undo(message)
-        self._changed_by(message)
-
-    def _do_redo(self, message: Json) -> None:
-        self._editing.redo(message)
-        self._changed_by(message)
-
-    def _do_load(self, message: Json) -> None:
-        self._editing.load(message)
-        self._changed_by(message)
 
     def _do_return(self, message: Json) -> None:
         self._editing.put(self._pins.of(message.get("number")).document)
@@ -430,7 +406,6 @@ class Session:
             "channels": channels,
             "photodiodes": (len(parts), len(parts[0])),
             "missing": taken.image.missing_rays,
-            "by_rays": taken.by_rays,
             "took": round(1000 * taken.seconds, 1),
             "psnr": found,
             "same": same,
