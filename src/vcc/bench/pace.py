@@ -25,7 +25,7 @@ TRIALS = 0.1
 """Share of the time that trials may cost: the slower one was, the longer it is left."""
 WORTH = 1.5
 """A coarse image is tried again if its shortest time, by how busy the machine is, is at most the limit, or this
-times `IN_TIME`; a whole one, whose time varies more with the place of what is dragged, if it is at most the limit."""
+times `IN_TIME`; a whole one, whose time varies more with the place, if it is at most the limit."""
 BUSY, FREE = 1.5, 1.2
 """Times the shortest time from which on the machine is busy, and up to which it is free."""
 MOST_KINDS = 50

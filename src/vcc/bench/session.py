@@ -8,7 +8,9 @@ ever created.
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
 import threading
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
@@ -141,6 +143,9 @@ class Session:
             self._thread.start()
 
     def _work(self) -> None:
+        with contextlib.suppress(AttributeError, OSError):  # Linux only
+            # This thread computes, and does not interrupt the browser of the same machine whenever it wakes.
+            os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
         while True:
             with self._changed:
                 if self._is_idle() and not self._changed.wait_for(self._has_to_do, LINGER):
