@@ -68,7 +68,8 @@ export class SocketHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for the server …";
   readonly lost = "The server is gone. What you see stays; the bench goes on when the server is back.";
-  readonly ahead = 8;
+  /** More would wait in a busy page as pictures that are old when they are drawn. */
+  readonly ahead = 4;
   why: string | null = null;
   private socket: WebSocket | null = null;
   private wait = FIRST_WAIT;
