@@ -32,6 +32,9 @@ const REMARK = 12_000;
 const ADDRESS_AFTER = 250;
 const LONGEST_ADDRESS = 200_000;
 
+/** Bytes that become letters at once: byte by byte a whole picture takes milliseconds. */
+const AT_ONCE = 8192;
+
 const PLAIN = JSON.stringify({ black: 0, linear: false, channel: null, photodiodes: "sum", axis: "x" });
 
 export interface Options {
@@ -553,7 +556,7 @@ function bytesOf(view: DataView): Uint8Array<ArrayBuffer> {
 function dataAddress(view: DataView): string {
   const bytes = bytesOf(view);
   let letters = "";
-  for (const byte of bytes) letters += String.fromCharCode(byte);
+  for (let at = 0; at < bytes.length; at += AT_ONCE) letters += String.fromCharCode(...bytes.subarray(at, at + AT_ONCE));
   return `data:image/${bytes[0] === 0xff ? "jpeg" : "webp"};base64,${btoa(letters)}`;
 }
 
