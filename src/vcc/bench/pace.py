@@ -107,7 +107,8 @@ class Pace:
 
     def seconds(self, of: Hashable) -> float | None:
         """Expected time of a whole image, seconds; None without measurements of one."""
-        return self._kept[of][1][WHOLE].recent if of in self._kept and WHOLE in self._kept[of][1] else None
+        times = self._kept[of][1].get(WHOLE) if of in self._kept else None
+        return None if times is None else times.recent
 
     def fineness(self, of: Hashable) -> Fineness:
         """The fineness of the next image; without measurements, coarse: as of the newest kind, or the finest."""

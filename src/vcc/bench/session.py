@@ -290,7 +290,7 @@ class Session:
             message: that changed it.
             remark: what was done besides.
             moving: whether it belongs to a drag.
-            late: whether the state follows the image, which is awaited more: both are drawn in one frame.
+            late: whether the state follows the image, which is awaited more; the page draws it with the next one.
         """
         self._late = late
         if not late:

@@ -614,7 +614,6 @@ async function xt(n,i){let e=new Blob([n]).stream().pipeThrough(i);return new Ui
       h1 { margin: 0; font-size: 13px; font-weight: 600; letter-spacing: -0.01em; }
       .group { display: flex; }
       .spring { flex: 1; }
-      .bench, .picture { contain: layout paint; }
       .bench { grid-area: bench; min-height: 0; min-width: 0; display: grid; border-bottom: 1px solid var(--line); position: relative; }
       .hint { position: absolute; left: 12px; top: 6px; right: 150px; margin: 0; line-height: 1.25; pointer-events: none; }
       @container (max-width: 639px) { .hint { font-size: 12px; } }

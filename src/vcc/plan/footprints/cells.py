@@ -255,7 +255,7 @@ def divide_views(
     def misplaced(number: int, parts: int) -> float:
         return _misplaced(path_planes[number], between, geometry, detail, least, parts)
 
-    def left(finer: int, cut: int = 1) -> float:
+    def remaining(finer: int, cut: int = 1) -> float:
         """The error of cells in so many parts, and in ``cut`` parts where one mask cuts them."""
         return max(apart.error(finer), *(misplaced(number, cut) for number in range(len(path_planes))), 0.0)
 
@@ -270,12 +270,12 @@ def divide_views(
         return finer, left(finer)
 
     if spread:  # a tent reaches over divided and undivided cells
-        finer, error = chosen(1.0, lambda parts: max(left(parts, parts), smeared(parts)))
+        finer, error = chosen(1.0, lambda parts: max(remaining(parts, parts), smeared(parts)))
         return CellDivision(finer, True, error=error)
-    finer, error = chosen(apart.share, left)
+    finer, error = chosen(apart.share, remaining)
     errs = [plane for number, plane in enumerate(path_planes) if misplaced(number, 1) > least]
     if errs:
-        all_cut = chosen(1.0, lambda parts: left(parts, parts))
+        all_cut = chosen(1.0, lambda parts: remaining(parts, parts))
         if all_cut[1] <= error:  # otherwise dividing few cells further leaves less error
             finer, error = all_cut
             where = where | geometry.varying(errs)
