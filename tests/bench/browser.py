@@ -142,6 +142,21 @@ class Page:
         """Until it stands there."""
         self.page.wait_for_selector(f'[data-part="{name}"][aria-valuetext="{words}"]')
 
+    def pulled(self, name):
+        """Where it stands and what pulled it there, in words, once what the hand did last is drawn."""
+        place, words = self.part(name).evaluate(
+            """async part => {
+                const { bench } = document.querySelector("vcc-bench")
+                const frame = () => new Promise(requestAnimationFrame)
+                await frame()
+                while (bench.together) await bench.together
+                await frame()
+                const words = part.getRootNode().querySelector(".snap.held text")?.textContent ?? null
+                return [part.getAttribute("aria-valuetext"), words]
+            }"""
+        )
+        return place, words
+
     def middle(self, name):
         """Of its drawing, pixels of the page."""
         box = self.part(name).locator(".strip").bounding_box()

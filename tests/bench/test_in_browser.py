@@ -82,9 +82,7 @@ def test_drag_is_pulled_to_where_the_scene_is_sharp(page):
     places = set()
     for step in range(2, 40, 2):
         page.page.mouse.move(x + step, y)
-        held = page.page.locator(".snap.held text")
-        if held.count():
-            places.add((page.place("sensor"), held.text_content()))
+        places.add(page.pulled("sensor"))
     page.page.mouse.up()
     # f = 50 mm: the scene's nearest leaves, 0.8 m away, are sharp 53.33 mm behind the lens
     assert ("53.3333 mm", "nearest of the scene, 800 mm, is sharp") in places
@@ -97,9 +95,7 @@ def test_lens_is_pulled_to_where_the_sensor_as_it_stands_sees_the_scene_sharp(pa
     places = set()
     for step in range(1, 16):
         page.page.mouse.move(x + step, y)
-        held = page.page.locator(".snap.held text")
-        if held.count():
-            places.add((page.place("0"), held.text_content()))
+        places.add(page.pulled("0"))
     page.page.mouse.up()
     # T = 3.052 m from the town to the sensor: by Bessel the lens stands (T + √(T² − 4·f·T))/2 − 3 m behind z = 0
     assert ("1.15287 mm", "farthest of the scene, 3 m, is sharp") in places
