@@ -4,8 +4,8 @@ import types
 
 import pytest
 
-from vcc.bench.pace import CLOSE, IN_TIME, LEFT, TRIALS, Pace
-from vcc.bench.picture import COARSER, WHOLE
+from vcc.bench.pace import CLOSE, IN_TIME, LEFT, SOON, TRIALS, Pace
+from vcc.bench.picture import COARSER, FULL, WHOLE
 
 HALF, HALF_FEW, QUARTER, QUARTER_FEW = COARSER
 
@@ -52,6 +52,18 @@ NEVER_IN_TIME = {WHOLE: 2.0, HALF: 0.090, HALF_FEW: 0.085, QUARTER: 0.072, QUART
 def test_finest_in_time_or_close_to_the_quickest_is_made(took, finest):
     assert took[finest] <= max(IN_TIME, CLOSE * min(took.values()))
     assert set(Machine(took).drag(1)) == {finest}
+
+
+def test_all_pixels_come_before_a_whole_image_where_they_come_much_sooner():
+    for took, soon in (
+        (SLOW | {FULL: 0.2}, True),
+        (SLOW, True),
+        ({FULL: 0.6} | SLOW, True),  # it was first, and code was loaded
+        (SLOW | {FULL: 1.1 * SOON * SLOW[WHOLE]}, False),
+        (QUICK, False),
+    ):
+        assert Machine(took).pace.is_soon("lens", FULL) is soon
+    assert not Pace().is_soon("lens", FULL)  # nothing is known yet
 
 
 def test_first_image_of_another_kind_is_as_coarse_as_those_before():

@@ -29,7 +29,7 @@ from vcc.bench.additions import FROM_FILES, families
 from vcc.bench.document import Document
 from vcc.bench.inbox import CHANGES, MOST_WAITING, QUESTIONS, Broken
 from vcc.bench.offered import Field
-from vcc.bench.picture import COARSER, WHOLE, take
+from vcc.bench.picture import COARSER, FULL, WHOLE, take
 from vcc.bench.screen import codes
 from vcc.camera_file import ELEMENT_KINDS
 from vcc.fields.filling import filling_of
@@ -443,7 +443,7 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     client.at_rest()
     client.until("notes")
     assert client.session.join(30)
-    levels = [WHOLE, *(each for each in COARSER if each.rays != 4 or each.pixels != 2)]  # a plan has no rays
+    levels = [FULL, WHOLE, *(each for each in COARSER if each.rays != 4 or each.pixels != 2)]  # a plan has no rays
     away = 0.052 * 13 / 12
     assert made[-2 * len(levels) :] == [(each, pytest.approx(z)) for z in (away, 0.052) for each in levels]
     assert not client.told
@@ -459,18 +459,20 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     client.do("set", where=["elements", 1], value=lenslets, turn=3)
     client.at_rest()
     assert client.session.join(30)
-    assert made == [(each, pytest.approx(0.052)) for each in (WHOLE, *COARSER)]
+    assert made == [(each, pytest.approx(0.052)) for each in (WHOLE, FULL, *COARSER)]
     client.close()
 
 
-def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_without_work(monkeypatch):
-    made = []
+@pytest.mark.parametrize("soon", [False, True])  # whether all pixels come much sooner than the whole picture
+def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_without_work(monkeypatch, soon):
+    made, between = [], [FULL] if soon else []
 
     def coarse_while_moving(train, field, document, fineness, progress, kept):
         made.append(fineness)
         return take(train, field, document, fineness, progress, kept)
 
     monkeypatch.setattr(imaging_there.Pace, "fineness", lambda pace, of: COARSER[0])
+    monkeypatch.setattr(imaging_there.Pace, "is_soon", lambda *given: soon)
     client = Client()
     client.do("hello")
     client.at_rest()
@@ -479,20 +481,29 @@ def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_
     client.do("set", where=["sensor", "z"], value="53 mm", moving=True, turn=1)
     coarse, _ = client.until("picture")
     client.do("set", where=["sensor", "z"], value="53 mm", moving=True, rests=True, turn=2)
-    whole, _ = client.until("picture")
-    assert [(each["turn"], each["coarse"]) for each in (coarse, whole)] == [(1, True), (2, False)]
+    finer = [client.until("picture")[0] for _ in (*between, WHOLE)]
+    assert [(each["turn"], each["coarse"]) for each in (coarse, *finer)] == [
+        (1, True),
+        *((2, True) for _ in between),
+        (2, False),
+    ]
+    assert all(each["shape"] == (PIXELS, PIXELS) for each in finer)
     client.do("set", where=["sensor", "z"], value="53 mm", turn=3)
     assert client.at_rest()["turn"] == 3
-    assert made[:2] == [COARSER[0], WHOLE]
-    assert WHOLE not in made[2:]  # of what is the same again none is made
+    assert made[: 2 + soon] == [COARSER[0], *between, WHOLE]
+    assert WHOLE not in made[2 + soon :]  # of what is the same again none is made
     # at a place of which nothing is shown yet, the quick picture comes first
     client.do("set", where=["sensor", "z"], value="54 mm", moving=True, rests=True, turn=4)
-    pictures = [client.until("picture")[0] for _ in range(2)]
-    assert [(each["turn"], each["coarse"]) for each in pictures] == [(4, True), (4, False)]
+    pictures = [client.until("picture")[0] for _ in range(2 + soon)]
+    assert [(each["turn"], each["coarse"]) for each in pictures] == [
+        (4, True),
+        *((4, True) for _ in between),
+        (4, False),
+    ]
     client.close()
 
 
-@pytest.mark.parametrize("fineness", COARSER)
+@pytest.mark.parametrize("fineness", [FULL, *COARSER])
 def test_a_coarse_picture_is_the_picture_with_fewer_pixels(fineness):
     # light as even as it gets: each pixel's irradiance is that of the whole picture there, whatever the pixels
     values = np.full((8, 8, 48, 48), 0.5, np.float32)
@@ -505,7 +516,7 @@ def test_a_coarse_picture_is_the_picture_with_fewer_pixels(fineness):
     assert coarse[middle, middle] == pytest.approx(whole[PIXELS // 2, PIXELS // 2], rel=0.02)
 
 
-@pytest.mark.parametrize("fineness", COARSER)
+@pytest.mark.parametrize("fineness", [FULL, *COARSER])
 def test_a_coarse_picture_by_few_rays_is_as_bright(fineness):
     field = Field(noise(8, 48).replaced(np.full((8, 8, 48, 48), 0.5, np.float32)))
     lens = {"kind": "lens", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"}
@@ -933,7 +944,7 @@ def test_what_takes_long_is_broken_off_by_a_change(client, asked):
     client.do("hello")
     client.at_rest()
     imaging = client.session._imaging
-    imaging.taken = dataclasses.replace(imaging.taken, coarse=True)  # a whole one is to be made
+    imaging.taken = dataclasses.replace(imaging.taken, fineness=COARSER[0])  # a whole one is to be made
     with client.session.offered.turn.held():
         client.do("export", **asked)
         client.do("set", where=["sensor", "z"], value="53 mm", turn=9)

@@ -23,9 +23,8 @@ export interface Answered<What extends Answer["what"] = Answer["what"]> {
 
 /** After so long the newest value is sent although no state of those before has come, milliseconds. */
 const PATIENCE = 150;
-/** After so long without a new value a hand that drags holds still, milliseconds, or longer if a whole picture takes long. */
+/** After so long without a new value a hand that drags holds still, milliseconds. */
 const REST = 30;
-const LONGEST_REST = 100;
 /** In a drag the views wait for the next picture at most so long, milliseconds. */
 const TOGETHER = 50;
 const REMARK = 12_000;
@@ -102,8 +101,6 @@ export class Bench extends EventTarget {
   private addressTimer = 0;
   private remarkTimer = 0;
   private restTimer = 0;
-  /** What the newest whole picture took, milliseconds. */
-  private whole = 0;
   private pictures = 0;
   private latestPicture = 0;
   private valueUnderway = false;
@@ -140,7 +137,7 @@ export class Bench extends EventTarget {
       if (this.open && this.turn > this.heard) this.wait();
       this.next = { where, value };
       if (this.turn - this.heard < this.host.ahead) this.sendNext();
-      this.restTimer = window.setTimeout(() => this.rest(where, value), Math.min(Math.max(this.whole / 3, REST), LONGEST_REST));
+      this.restTimer = window.setTimeout(() => this.rest(where, value), REST);
     } else {
       this.next = this.remark = null;
       this.settle();
@@ -343,7 +340,6 @@ export class Bench extends EventTarget {
         break;
       case "picture":
         if (message.turn >= this.turn && !message.coarse) this.waiting = false;
-        if (!message.coarse) this.whole = message.took;
         this.without = null;
         this.progress = null;
         await this.showPicture(message, buffers[0]);

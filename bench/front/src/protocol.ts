@@ -282,7 +282,7 @@ export interface StateMessage {
 export interface PictureMessage {
   /** Number of the message that requested it. */
   turn: number;
-  /** Whether it has fewer pixels or rays than the sensor's image. */
+  /** Whether it has fewer pixels or rays than the sensor's image, or is less accurate. */
   coarse: boolean;
   /** Whether it was made during a drag. */
   moving: boolean;

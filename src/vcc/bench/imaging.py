@@ -17,7 +17,7 @@ from vcc.bench.document import Document
 from vcc.bench.editing import Editing
 from vcc.bench.offered import Field
 from vcc.bench.pace import MOST_KINDS, Pace
-from vcc.bench.picture import COARSER, WHOLE, Fineness, Taken, out_of_focus, take
+from vcc.bench.picture import COARSER, FULL, WHOLE, Fineness, Taken, out_of_focus, take
 from vcc.bench.side import scene_distances
 from vcc.files.camera_reading import TrainAsWritten
 from vcc.plan.following import Draft, Parts
@@ -37,19 +37,19 @@ class Wanted:
     Args:
         turn: the client's number of the message that requested it.
         moving: whether it belongs to a drag.
-        coarse_shown: whether its coarse version was shown already.
+        shown: the fineness of the image that is shown of it already, if any.
         rests: of a drag, whether the hand holds still: the whole image follows.
     """
 
     turn: int
     moving: bool
-    coarse_shown: bool = False
+    shown: Fineness | None = None
     rests: bool = False
 
-    def then(self, coarse: bool) -> Wanted | None:
-        """What is wanted once this is shown, coarse or not."""
-        whole = coarse and (self.rests or not self.moving)
-        return Wanted(self.turn, moving=False, coarse_shown=True) if whole else None
+    def then(self, shown: Fineness) -> Wanted | None:
+        """What is wanted once an image of this fineness is shown."""
+        finer = shown != WHOLE and (self.rests or not self.moving)
+        return Wanted(self.turn, moving=False, shown=shown) if finer else None
 
 
 class Imaging:
@@ -85,15 +85,22 @@ class Imaging:
             return self.taken
         if wanted.moving and not self._moving:
             self._parts.clear()  # what was decided for the place at which an earlier drag ended
+        elif wanted.moving:
+            self._parts.pop(FULL, None)  # likewise, for the place at which the hand rested before
         self._moving = wanted.moving
-        fineness, kind = WHOLE, self._kind()
-        slow = not wanted.coarse_shown and (self._pace.seconds(kind) or math.inf) > SLOW
-        if wanted.moving or slow:
-            fineness = self._pace.fineness(kind)
+        kind = self._kind()
+        fineness = self._fineness(wanted, kind)
         taken = self.take(fineness)
         self._pace.noted(kind, fineness, taken)
         self.taken, self._of = taken, self._lit()
         return taken
+
+    def _fineness(self, wanted: Wanted, kind: Hashable) -> Fineness:
+        """The fineness of the next image."""
+        slow = wanted.shown is None and (self._pace.seconds(kind) or math.inf) > SLOW
+        if wanted.moving or slow:
+            return self._pace.fineness(kind)
+        return FULL if wanted.shown in COARSER and self._pace.is_soon(kind, FULL) else WHOLE
 
     def whole(self) -> Taken:
         """The whole image of the document; made now if only a coarse one exists.
@@ -120,6 +127,10 @@ class Imaging:
     def is_shown(self) -> bool:
         """Whether the newest image is of the present document."""
         return self.taken is not None and self._of == self._lit()
+
+    def fineness_shown(self) -> Fineness | None:
+        """Of the newest image, if it is of the present document."""
+        return self.taken.fineness if self.taken is not None and self.is_shown() else None
 
     def _lit(self) -> tuple[Document, Field]:
         """The document without what changes only how its image is shown, and its light field."""
@@ -211,9 +222,9 @@ class Imaging:
         are made in the same way. Without rays, images with fewer rays are the same.
         """
         by_rays = self.taken is not None and self.taken.by_rays
-        quick = not by_rays and (self._pace.seconds(self._kind()) or math.inf) <= SLOW
+        quick = (self._pace.seconds(self._kind()) or math.inf) <= SLOW
         every = [each for each in COARSER if by_rays or each.pixels != 2 or each.rays == COARSER[0].rays]
-        levels = [WHOLE, *every] if quick else every
+        levels = [FULL, *([] if by_rays else [WHOLE]), *every] if quick else every
         return [(away, each) for away in ((False,) if by_rays else (True, False)) for each in levels]
 
     def rehearse(self) -> None:

@@ -355,7 +355,7 @@ class PictureMessage(TypedDict):
 
     Args:
         turn: number of the message that requested it.
-        coarse: whether it has fewer pixels or rays than the sensor's image.
+        coarse: whether it has fewer pixels or rays than the sensor's image, or is less accurate.
         moving: whether it was made during a drag.
         shape: rows and columns of the JPEG.
         white: irradiance shown as white.

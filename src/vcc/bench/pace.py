@@ -19,6 +19,9 @@ BESIDES = 0.020
 """Processor time of an image that does not depend on its fineness, seconds: the drawing, and the browser."""
 LONGER, SHORTER = 0.3, 0.9
 """Weight of the newest time in the running mean if it is longer, or shorter: busy machines delay some images."""
+NOTICED, SOON = 0.04, 0.7
+"""Time of a whole image, seconds, from which on another one is shown before it, if it takes this share of the time
+at most."""
 LEFT = 0.4
 """Seconds after which a fineness that was too slow is tried again, if it was fast enough once."""
 TRIALS = 0.1
@@ -99,7 +102,8 @@ class Pace:
                     each.recent = min(each.recent, each.least)
                 self._busy.clear()
         for coarser, each in list(times.items()):  # compiling kernels delayed the first of a coarser kind
-            if coarser.share(by_rays) < fineness.share(by_rays) and each.recent > took:
+            less = coarser.share(by_rays) < fineness.share(by_rays) or WHOLE == fineness != coarser
+            if less and each.recent > took:
                 del times[coarser]
         self._kept[of] = by_rays, times
         if len(self._kept) > MOST_KINDS:
@@ -109,6 +113,14 @@ class Pace:
         """Expected time of a whole image, seconds; None without measurements of one."""
         times = self._kept[of][1].get(WHOLE) if of in self._kept else None
         return None if times is None else times.recent
+
+    def is_soon(self, of: Hashable, fineness: Fineness) -> bool:
+        """Whether such an image comes much sooner than a whole one, which takes noticeably long; or unknown."""
+        whole = self.seconds(of)
+        if whole is None or whole <= NOTICED:
+            return False
+        times = self._kept[of][1].get(fineness)
+        return times is None or times.recent < SOON * whole
 
     def fineness(self, of: Hashable) -> Fineness:
         """The fineness of the next image; without measurements, coarse: as of the newest kind, or the finest."""

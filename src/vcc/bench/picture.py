@@ -57,6 +57,8 @@ class Fineness:
 
 
 WHOLE = Fineness(1, None)
+FULL = Fineness(1, 8)
+"""All pixels with fewer rays and a draft of a plan: shown at rest, where a whole image takes much longer."""
 COARSER = (Fineness(2, 16), Fineness(2, 4), Fineness(4, 8), Fineness(4, 4))
 """Choices for images in time, finest first; none has fewer than a quarter of the pixels along a side."""
 COARSEST = 8
@@ -88,7 +90,7 @@ class Taken(Brief):
         image: irradiance, or its estimate from the recording.
         recording: by the sensor's electronics; None without noise.
         runs: that made it: one, if the camera has no photodiodes and does not depend on the wavelength.
-        coarse: whether fewer pixels or rays were used.
+        fineness: at which it was made.
         seconds: total time.
         planning: the part of these seconds in which plans were made.
         processor: processor time of this program meanwhile, seconds, all threads together.
@@ -97,10 +99,15 @@ class Taken(Brief):
     image: Image
     recording: Recording | None
     runs: tuple[Run, ...]
-    coarse: bool
+    fineness: Fineness
     seconds: float
     planning: float
     processor: float
+
+    @property
+    def coarse(self) -> bool:
+        """Whether it has fewer pixels or rays than the sensor's image, or is less accurate."""
+        return self.fineness != WHOLE
 
     @property
     def values(self) -> Picture:
@@ -188,7 +195,7 @@ def take(
         filtered = recording.electronics.color_filter is not None
         image = recording.demosaiced("bilinear") if filtered else recording.image()
     seconds, used = time.perf_counter() - began, time.process_time() - used
-    return Taken(image, recording, tuple(made.runs), fineness != WHOLE, seconds, made.planning, used)
+    return Taken(image, recording, tuple(made.runs), fineness, seconds, made.planning, used)
 
 
 class _Making:
@@ -245,8 +252,8 @@ class _Making:
                 samples = coarser
             plan = _with_fewer_rays(plan, rays)
         self.planning += time.perf_counter() - began
-        # The browser of this machine draws meanwhile: it gets a core.
-        how = How() if self.fineness == WHOLE else How(threads=max(How().workers - 1, 1))
+        # In a drag the browser of this machine draws meanwhile: it gets a core.
+        how = How() if self.fineness.pixels == 1 else How(threads=max(How().workers - 1, 1))
         found = drive(plan, samples, how, progress)
         self.runs.append(Run(train, samples, plan, found))
         return found

@@ -29,7 +29,7 @@ from vcc.bench.imaging import Imaging, Wanted
 from vcc.bench.inbox import CHANGES, Inbox, turn_of
 from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
-from vcc.bench.picture import WHOLE, Taken
+from vcc.bench.picture import FULL, WHOLE, Taken
 from vcc.bench.pins import Pins
 from vcc.bench.screen import Look
 from vcc.bench.side import side
@@ -264,8 +264,8 @@ class Session:
         moving, rests = bool(message.get("moving", False)), bool(message.get("rests", False))
         self._changed_by(message, self._editing.set(message), moving, late=moving and not rests)
         if moving and rests:  # a hand that holds still sees the whole image, until it moves on
-            turn, shown = turn_of(message), self._imaging.is_shown()
-            self._wanted = Wanted(turn, moving=not shown, coarse_shown=shown, rests=not shown)
+            shown = self._imaging.fineness_shown()
+            self._wanted = Wanted(turn_of(message), moving=shown is None, shown=shown, rests=shown is None)
 
     def _do_return(self, message: Json) -> None:
         self._editing.put(self._pins.of(message.get("number")).document)
@@ -295,7 +295,7 @@ class Session:
         self._late = late
         if not late:
             self._tell_state(turn_of(message), moving)
-        self._wanted = Wanted(turn_of(message), moving)
+        self._wanted = Wanted(turn_of(message), moving, self._imaging.fineness_shown())
         if remark is not None:
             self._remark(message["do"], remark, turn_of(message))
 
@@ -362,7 +362,7 @@ class Session:
         if document.views is not None and shown is not None and shown.whole().shape[:2] != now.whole().shape[:2]:
             self._editing.put(replace(document, views=None))  # they were counted among fewer views
         self._tell_state(self._turn)
-        self._wanted = Wanted(self._turn, moving=False, coarse_shown=True)
+        self._wanted = Wanted(self._turn, moving=False, shown=FULL)
 
     def _finish(self) -> None:
         """Put better light fields in the place of a coarse one, before a result that lasts."""
@@ -391,7 +391,7 @@ class Session:
             return
         self._tell_picture(taken, wanted)
         self._tell_late(wanted.turn)
-        self._wanted = wanted.then(taken.coarse)
+        self._wanted = wanted.then(taken.fineness)
         if not taken.coarse and not wanted.moving and not self._inbox.supersedes(False):
             self._tell("notes", {"turn": wanted.turn, "notes": self._imaging.notes(taken)})
 
