@@ -55,8 +55,8 @@ HELD = 100.0
 """Milliseconds without a new value after which a part is held where something is sharp."""
 STILL = 1.0
 """Seconds for which the hand holds still before it lets go."""
-BEHIND_LENSLETS = 8
-"""Of the mouse to both sides, pixels of the page: further on, the sensor would stand before the lenslets."""
+BEHIND_LENSLETS = 1.2 * mm
+"""To both sides: further on, the sensor would stand before the lenslets."""
 TURNS = 100
 """Of the host alone."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -105,7 +105,7 @@ class Case:
         least: pictures a second that are aimed at.
         late: 95th percentile from input to picture that is aimed at, ms.
         coarsest: pixels of the sensor, along a side, in one of the coarsest picture that is aimed at.
-        swing: of the mouse to both sides, pixels of the page, some 0.1 mm each.
+        swing: of the part to both sides, metres.
     """
 
     name: str
@@ -116,7 +116,7 @@ class Case:
     least: int
     late: int
     coarsest: int
-    swing: int = 40
+    swing: float = 6 * mm
 
     @property
     def where(self) -> list[Any]:
@@ -213,7 +213,7 @@ def host_alone(case: Case, files: tuple[Path, Path], field: Field) -> str:
     whole = client.pictures[-1]["took"]
 
     def move(turn: int) -> float:
-        z = f"{1e3 * case.z + 0.04 * case.swing * math.sin(turn / 10):.4f} mm"
+        z = f"{1e3 * (case.z + case.swing / 4 * math.sin(turn / 10)):.4f} mm"
         began = time.perf_counter()
         client.session.receive({"do": "set", "where": case.where, "value": z, "moving": True, "turn": turn})
         client.until(turn)
@@ -311,15 +311,19 @@ def drag(page: Any, case: Case, port: int) -> dict[str, Any]:
     """What the page saw of a part that is dragged, held still, and let go."""
     page.wait_for_selector('section.picture[aria-busy="false"]', timeout=60_000)
     page.wait_for_timeout(500)
-    box = page.locator(f'[data-part="{case.part}"] .strip').bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 3
+    boxes = {
+        part: page.locator(f'[data-part="{part}"] .strip').bounding_box() for part in (0, "sensor", case.part)
+    }
+    middle = {part: box["x"] + box["width"] / 2 for part, box in boxes.items()}
+    scale = (middle["sensor"] - middle[0]) / (case.camera.sensor.z - case.camera.elements[0].z)
+    x, y = middle[case.part], boxes[case.part]["y"] + boxes[case.part]["height"] / 3
     page.mouse.move(x, y)
     page.mouse.down()
     with hand(port, page) as move:
         began = time.perf_counter()
         for number in range(MOVES):
             time.sleep(max(began + number * EVERY - time.perf_counter(), 0))
-            move(x + case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
+            move(x + scale * case.swing * math.sin(2 * math.pi * (number + 1) / 120.5), y)
     page.wait_for_timeout(1000 * STILL)
     page.mouse.up()
     page.wait_for_timeout(50)
@@ -341,7 +345,9 @@ def told(case: Case, seen: dict[str, Any]) -> str:
     during = [one for one in drawn if inputs[0, 0] <= one[0] <= inputs[-1, 0]]
     gaps = np.diff(inputs[:, 0])
     rate = len(during) / gaps[gaps < HELD].sum() * 1e3
-    rests = [now for now, turn, coarse, *_ in drawn if turn >= inputs[-1, 1] and not coarse]
+    rested = [each for each in drawn if each[1] >= inputs[-1, 1]]
+    full = [one[0] - inputs[-1, 0] for one in rested if one[5] == case.camera.sensor.shape[0]]
+    whole = [one[0] - inputs[-1, 0] for one in rested if not one[2]]
     coarser = Counter(round(case.camera.sensor.shape[0] / one[5]) for one in during)
     return row(
         size_of(case),
@@ -355,7 +361,7 @@ def told(case: Case, seen: dict[str, Any]) -> str:
             f"{1 if step == 1 else f'1/{step}'}: {count / len(during):.0%}"
             for step, count in sorted(coarser.items())
         ),
-        f"{rests[0] - inputs[-1, 0]:.0f} (100)" if rests else "none",
+        f"{full[0]:.0f} (100), {whole[0]:.0f}" if whole else "none",
         f"{np.median([one[3] for one in during]):.0f}" if during else "none",
     )
 
@@ -447,7 +453,7 @@ OF_HOST = (
 OF_LOOP = (
     "views", "camera; what is dragged", "pictures/s (at least)", "input to picture, median, ms",
     "95th percentile (at most)", "longest", "coarsest, pixels in one along a side (at most)", "shares by size",
-    "whole picture, after the hand rests (at most)", "made in, while dragging",
+    "all pixels after the hand rests, ms (at most), and exact", "made in, while dragging",
 )  # fmt: skip
 
 
