@@ -64,7 +64,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WATCH = """
 (() => {
   const bench = () => document.querySelector("vcc-bench")?.bench;
-  const seen = (window.seen = { inputs: [], drawn: [], ended: 0 });
+  const seen = (window.seen = { opened: performance.timeOrigin, inputs: [], drawn: [], ended: 0 });
   let shown = null;
   for (const moves of ["pointerrawupdate", "pointermove"]) window.addEventListener(moves, (event) => {
     const now = bench();
@@ -363,6 +363,7 @@ def told(case: Case, seen: dict[str, Any]) -> str:
         ),
         f"{full[0]:.0f} (100), {whole[0]:.0f}" if whole else "none",
         f"{np.median([one[3] for one in during]):.0f}" if during else "none",
+        f"{1e-3 * (drawn[0][0] - seen['opened']):.1f} (2)",
     )
 
 
@@ -454,6 +455,7 @@ OF_LOOP = (
     "views", "camera; what is dragged", "pictures/s (at least)", "input to picture, median, ms",
     "95th percentile (at most)", "longest", "coarsest, pixels in one along a side (at most)", "shares by size",
     "all pixels after the hand rests, ms (at most), and exact", "made in, while dragging",
+    "first picture after the page was asked for, s (at most)",
 )  # fmt: skip
 
 

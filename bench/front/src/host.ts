@@ -152,8 +152,8 @@ export class WidgetHost implements Host {
   onstate: Host["onstate"] = () => {};
   readonly awaited = "Waiting for Python …";
   readonly lost = "Python does not answer: it runs a cell, and then the bench goes on; or it was restarted, and then the cell of the bench is to be run again.";
-  /** A kernel answers each message by several, and a busy one keeps all of them. */
-  readonly ahead = 3;
+  /** A kernel answers each message by several, and each that waits delays those after it. */
+  readonly ahead = 2;
   readonly why = null;
   private timer = 0;
   private silent = false;
