@@ -2,6 +2,8 @@
 
 import inspect
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
 class InputError(ValueError):
@@ -32,3 +34,11 @@ def warn_of_result(message: str) -> None:
     while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "vcc":
         frame, level = frame.f_back, level + 1
     warnings.warn(message, ResultWarning, stacklevel=level)
+
+
+@contextmanager
+def without_result_warnings() -> Iterator[None]:
+    """Ignore `ResultWarning` within: where what the result lacks is intended, or measured."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResultWarning)
+        yield

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.base.progress import Progress
 from vcc.camera import Camera
 from vcc.demo.report import DemoReport, Timing
@@ -130,8 +129,7 @@ class _Work:
     ) -> _Taken:
         """Capture twice, timed, and write the image."""
         seconds = []
-        with warnings.catch_warnings(), self.console.status(name):
-            warnings.simplefilter("ignore", ResultWarning)  # the page reports the share of missing rays
+        with without_result_warnings(), self.console.status(name):  # the page reports the share of missing rays
             for _ in range(2):
                 begun = time.perf_counter()
                 image = camera.capture(bench.light_field, interpolation=interpolation)
@@ -187,8 +185,7 @@ def _light_field(work: _Work, given: Path | LightField | None, small: bool) -> B
 def _warm_up(bench: Bench) -> None:
     """Run each kind of plan once on a few views, so that later times do not include compiling."""
     few = few_views(bench)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResultWarning)  # most of the sensor stays dark
+    with without_result_warnings():  # most of the sensor stays dark
         for camera in kinds_of_camera(bench):
             for interpolation in INTERPOLATIONS:
                 camera.capture(few, interpolation=interpolation)

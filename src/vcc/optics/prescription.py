@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.units import short
 from vcc.optics.first_order import FirstOrder, gap, refraction, surface_power
 from vcc.optics.glass import Glass
@@ -286,11 +285,9 @@ class Prescription(Brief):
         except InputError:  # the file's aperture is invalid: the user must be able to request another
             widest = self.stop.diameter
         if widest is not None and opening > 1.001 * widest:
-            warnings.warn(
+            warn_of_result(
                 f"{self.source or 'this prescription'}: a stop of {short(opening)} is wider than that of the "
-                f"prescription ({short(widest)}): rims that would cut this light off are not simulated",
-                ResultWarning,
-                stacklevel=4,  # the caller of load_lens
+                f"prescription ({short(widest)}): rims that would cut this light off are not simulated"
             )
         return opening
 

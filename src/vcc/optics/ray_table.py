@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +12,7 @@ from vcc.base import checks
 from vcc.base.affine import Affine
 from vcc.base.cached import cached
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.units import short
 from vcc.base.values import Value
 from vcc.optics.aberrations import Aberrations
@@ -99,9 +98,11 @@ class RayTable(Brief, Value):
             )
         chosen = next(n for n, error in enumerate(errors) if error <= wanted)
         if off > ETENDUE:
-            _warn(f"rays of a table contradict each other: next to the axis, étendue changes by {off:.1%}")
+            warn_of_result(
+                f"rays of a table contradict each other: next to the axis, étendue changes by {off:.1%}"
+            )
         if back[0].empty > EMPTY:
-            _warn(
+            warn_of_result(
                 f"{back[0].empty:.0%} of the opening that a ray table is taken to have is far from all of its "
                 "rays: the light is not convex there, or the rays are not evenly spread; the lens transmits "
                 "light there"
@@ -195,7 +196,3 @@ class RayTableLens(Brief, Value, TracedLens):
         """Focal length, and the map and how well it is known, as text."""
         words = [f"focal length {short(self.focal_length)}"] if math.isfinite(self.focal_length) else []
         return self._in_words(*words, self.table.described())
-
-
-def _warn(words: str) -> None:
-    warnings.warn(words, ResultWarning, stacklevel=4)

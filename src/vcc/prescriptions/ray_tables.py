@@ -9,7 +9,6 @@ about the axis so that it begins on +y. The file is read by evaluating it for ma
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base import units
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.reading import read_bytes, read_json, read_text
 from vcc.base.units import mm, nm
 from vcc.optics.ray_table import RayTable
@@ -122,11 +121,9 @@ def _of_polynomials(
     if not kept.any():
         raise InputError(f"{file}: all rays leave at more than {STEEPEST:g}° from the axis, where slopes end")
     if not kept.all():
-        warnings.warn(
+        warn_of_result(
             f"{file}: {1 - kept.mean():.1%} of its rays are at more than {STEEPEST:g}° from the axis towards the "
-            "scene: they are left out, and dark",
-            ResultWarning,
-            stacklevel=4,
+            "scene: they are left out, and dark"
         )
     slope = -onward[kept] / cosine[kept, None]  # z along the light, which comes from the scene
     at = np.stack([value["outx"], value["outy"]], axis=1)[kept]

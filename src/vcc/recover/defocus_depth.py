@@ -8,7 +8,6 @@ correct distance explains a block of the image.
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base import checks
 from vcc.base.describe import Brief
-from vcc.base.errors import InputError, ResultWarning, warn_of_result
+from vcc.base.errors import InputError, warn_of_result, without_result_warnings
 from vcc.base.memory import check_memory
 from vcc.base.showing import Shown
 from vcc.base.units import short
@@ -155,9 +154,8 @@ def defocus_kernels(camera: Camera, distances: Sequence[float], *, aperture: flo
 
 def _kernel(camera: Camera, point: LightField, distance: float) -> Array:
     """The image of a point, divided by its sum."""
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # A single point does not fill the sensor: no warning is needed.
-        warnings.simplefilter("ignore", ResultWarning)
         # Linear interpolation does not ring, and is not negative.
         picture = camera.capture(point, method="footprints", interpolation="linear", between_views="none")
     values = to_numpy(picture.values)

@@ -173,7 +173,7 @@ def decode_heterodyne(
     rows, columns = geometry.shape
     cut = math.ceil(border * rows), math.ceil(border * columns)
     inside = slice(cut[0], rows - cut[0]), slice(cut[1], columns - cut[1])
-    set_to_zero(values[:, :, *inside], stacklevel=2)
+    set_to_zero(values[:, :, *inside])
     field_of_views = LightField(np.maximum(values, 0).astype(np.float32), _frame(setup), sample="point")
     return field_of_views[:, :, *inside]
 

@@ -9,7 +9,6 @@ a given grid, or from a recording of a white scene.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.checks import above_zero, whole_number
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import check_samples
 from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
@@ -138,13 +137,11 @@ def _read(
         tell(progress, row * counts[1] + column + 1, math.prod(counts))
     share = missing / math.prod((*counts, *lenslets.shape))
     if share > 0.01:
-        warnings.warn(
+        warn_of_result(
             f"{share:.1%} of the samples lie where the white image is dark (below {DARK_SHARE:.0%} of its bright "
-            "part), and are 0: take fewer views",
-            ResultWarning,
-            stacklevel=3,
+            "part), and are 0: take fewer views"
         )
-    return set_to_zero(values, stacklevel=3)
+    return set_to_zero(values)
 
 
 @dataclass(frozen=True, eq=False)

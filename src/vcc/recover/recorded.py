@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result
 from vcc.fields.sampled import to_numpy
 from vcc.image import Image
 from vcc.recording import Recording
@@ -57,12 +56,11 @@ def has_mosaic(picture: Any) -> bool:
     return isinstance(picture, Recording) and picture.electronics.color_filter is not None
 
 
-def set_to_zero(values: Floats, stacklevel: int) -> Floats:
+def set_to_zero(values: Floats) -> Floats:
     """Set negative values of a decoded light field to 0, in place: radiance is not negative.
 
     Args:
         values: decoded.
-        stacklevel: of the warning, counted from the caller.
 
     Warns:
         ResultWarning: this adds more than `ADDED` of the light. Noise around 0 then has a mean above 0.
@@ -72,11 +70,9 @@ def set_to_zero(values: Floats, stacklevel: int) -> Floats:
     added = float(values.sum(dtype=np.float64)) - total
     if added > ADDED * abs(total):
         much = f"adds {added / total:.1%} to their light" if total > 0 else "is all their light"
-        warnings.warn(
+        warn_of_result(
             f"negative values of the decoded views (noise, ringing) are set to 0, which {much}, most in dark "
             "parts. For views without a bias add a constant to the recording, decode it, and subtract the decoded "
-            "constant: decoding is linear",
-            ResultWarning,
-            stacklevel=stacklevel + 1,
+            "constant: decoding is linear"
         )
     return values

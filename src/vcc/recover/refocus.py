@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.checks import above_zero
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, warn_of_result, without_result_warnings
 from vcc.base.progress import Progress, tell
 from vcc.camera import Camera
 from vcc.fields.grid import Grid, skew
@@ -150,9 +150,7 @@ def refocused(
         )
     seen = covered > _UNSEEN * most
     if not seen.all():
-        warnings.warn(
-            f"{1 - seen.mean():.1%} of the pixels are seen by no view and are 0", ResultWarning, stacklevel=2
-        )
+        warn_of_result(f"{1 - seen.mean():.1%} of the pixels are seen by no view and are 0")
     share = np.where(seen, covered, np.inf)
     values = taken.to_numpy().astype(np.float64)
     values /= share if values.ndim == 2 else share[..., None]
@@ -190,8 +188,7 @@ def _coverage(camera: Camera, grid: Grid, options: dict[str, Any]) -> NDArray[np
     for row in range(grid.shape[0]):
         piece, _ = grid.piece(slice(row, row + 1))
         ones = LightField.of(np.ones(piece.shape[:4], np.float32), replace(piece, shape=piece.shape[:4]))
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResultWarning)
+        with without_result_warnings():
             total += camera.capture(ones, **options).to_numpy()
     return total
 
