@@ -64,146 +64,128 @@ F_NUMBER = 5.0
 
 @dataclass(frozen=True)
 class _At:
-    """A parameter in its camera, with the relevant lengths."""
+    """A parameter in its camera; the methods are the rules for its scale."""
 
     train: Train
     found: Parameter
 
-    @property
     def itself(self) -> float:
         """The largest absolute value of the numbers; 1 if all are 0."""
         return float(np.abs(self.found.array()).max(initial=0.0)) or 1.0
 
-    @property
+    def of_itself(self) -> float:
+        """A share of it."""
+        return OF_A_LENGTH * self.itself()
+
+    def one(self) -> float:
+        """The unit."""
+        return 1.0
+
+    def rotation(self) -> float:
+        """An angle, radians."""
+        return ROTATION
+
     def along(self) -> float:
+        """A length along the axis, metres."""
         return OF_A_LENGTH * max(self.train.sensor.z, SHORTEST)
 
-    @property
     def across(self) -> float:
+        """A length across the axis, metres."""
         return LIGHT_MOVES * float(np.mean(self.train.sensor.pitches))
 
+    def slope(self) -> float:
+        """What moves light across on the way to the sensor."""
+        return self.across() / self._way
+
+    def path(self) -> float:
+        """An optical path over the radius of the plate, metres."""
+        return self.slope() * self._radius
+
+    def path_of_a_cell(self) -> float:
+        """An optical path or a height from cell to cell, metres."""
+        sheet: Any = self.found.holder
+        pitch = sheet.width / self.found.array().shape[1]
+        return float(self.slope() * pitch / (getattr(sheet, "refractive_index", 2.0) - 1))
+
+    def cubic(self) -> float:
+        """3·strength·R² is the slope at the rim."""
+        return self.slope() / (3 * self._radius**2)
+
+    def index_by_square(self) -> float:
+        """Of Cauchy's B, m²."""
+        return OF_A_LENGTH * D_LINE**2
+
+    def index_by_fourth(self) -> float:
+        """Of Cauchy's C, m⁴."""
+        return OF_A_LENGTH * D_LINE**4
+
     @property
-    def way(self) -> float:
+    def _way(self) -> float:
         """Distance from the element to the sensor, metres."""
         owner = self.found.owner
         place = owner.z + owner.length if isinstance(owner, Element) else 0.0
         return max(self.train.sensor.z - place, SHORTEST)
 
     @property
-    def slope(self) -> float:
-        return self.across / self.way
-
-    @property
-    def radius(self) -> float:
+    def _radius(self) -> float:
         """Radius of the parameter's plate, metres."""
         plate, surface = self.found.owner, self.found.holder
         for sized in (plate, surface):
             size = getattr(sized, "diameter", None) or getattr(sized, "width", None)
             if size:
                 return float(size) / 2
-        return self.way / F_NUMBER / 2
-
-
-def _itself(at: _At) -> float:
-    return at.itself
-
-
-def _along(at: _At) -> float:
-    return at.along
-
-
-def _across(at: _At) -> float:
-    return at.across
-
-
-def _of_itself(at: _At) -> float:
-    return OF_A_LENGTH * at.itself
-
-
-def _slope(at: _At) -> float:
-    return at.slope
-
-
-def _one(at: _At) -> float:
-    return 1.0
-
-
-def _rotation(at: _At) -> float:
-    return ROTATION
-
-
-def _path(at: _At) -> float:
-    return at.slope * at.radius
-
-
-def _path_of_a_cell(at: _At) -> float:
-    sheet: Any = at.found.holder
-    pitch = sheet.width / at.found.array().shape[1]
-    return float(at.slope * pitch / (getattr(sheet, "refractive_index", 2.0) - 1))
-
-
-def _cubic(at: _At) -> float:
-    """3·strength·R² is the slope at the rim."""
-    return at.slope / (3 * at.radius**2)
-
-
-def _index_by_square(at: _At) -> float:
-    return OF_A_LENGTH * D_LINE**2
-
-
-def _index_by_fourth(at: _At) -> float:
-    return OF_A_LENGTH * D_LINE**4
+        return self._way / F_NUMBER / 2
 
 
 OWN: Mapping[tuple[type, str], Callable[[_At], float]] = {
-    (FirstOrder, "length"): _along,
-    (FirstOrder, "matrix"): _of_itself,
-    (FirstOrder, "stop_from_entrance"): _of_itself,
-    (LensArray, "fill_factor"): _one,
-    (Sensor, "fill_factor"): _one,
-    (Prism, "deflection"): _slope,
-    (Biprism, "deflection"): _slope,
-    (Pyramid, "deflection"): _slope,
-    (PrismArray, "slopes"): _slope,
-    (Tilt, "deflection"): _slope,
-    (Axicon, "slope"): _slope,
-    (Gaussian, "sigma"): _slope,
-    (TopHat, "width"): _slope,
-    (Samples, "slope_pitch"): _of_itself,
-    (CosineSum, "phase"): _one,
-    (Cells, "values"): _one,
-    (Mask, "pattern"): _one,
-    (Zernike, "coefficients"): _path,
-    (HeightMap, "heights"): _path_of_a_cell,
-    (PathMap, "paths"): _path_of_a_cell,
-    (Rough, "height_rms"): _of_itself,
-    (Rough, "correlation_length"): _of_itself,
-    (HeightMap, "refractive_index"): _of_itself,
-    (Rough, "refractive_index"): _of_itself,
-    (Cubic, "strength"): _cubic,
-    (Electronics, "wavelength"): _itself,
-    (Cauchy, "A"): _of_itself,
-    (Cauchy, "B"): _index_by_square,
-    (Cauchy, "C"): _index_by_fourth,
-    (Sellmeier, "B"): _of_itself,
-    (Sellmeier, "C"): _of_itself,
-    (Abbe, "nd"): _of_itself,
-    (Abbe, "V"): _of_itself,
-    (Table, "indices"): _of_itself,
-    (Spectrum, "values"): _one,
+    (FirstOrder, "length"): _At.along,
+    (FirstOrder, "matrix"): _At.of_itself,
+    (FirstOrder, "stop_from_entrance"): _At.of_itself,
+    (LensArray, "fill_factor"): _At.one,
+    (Sensor, "fill_factor"): _At.one,
+    (Prism, "deflection"): _At.slope,
+    (Biprism, "deflection"): _At.slope,
+    (Pyramid, "deflection"): _At.slope,
+    (PrismArray, "slopes"): _At.slope,
+    (Tilt, "deflection"): _At.slope,
+    (Axicon, "slope"): _At.slope,
+    (Gaussian, "sigma"): _At.slope,
+    (TopHat, "width"): _At.slope,
+    (Samples, "slope_pitch"): _At.of_itself,
+    (CosineSum, "phase"): _At.one,
+    (Cells, "values"): _At.one,
+    (Mask, "pattern"): _At.one,
+    (Zernike, "coefficients"): _At.path,
+    (HeightMap, "heights"): _At.path_of_a_cell,
+    (PathMap, "paths"): _At.path_of_a_cell,
+    (Rough, "height_rms"): _At.of_itself,
+    (Rough, "correlation_length"): _At.of_itself,
+    (HeightMap, "refractive_index"): _At.of_itself,
+    (Rough, "refractive_index"): _At.of_itself,
+    (Cubic, "strength"): _At.cubic,
+    (Electronics, "wavelength"): _At.itself,
+    (Cauchy, "A"): _At.of_itself,
+    (Cauchy, "B"): _At.index_by_square,
+    (Cauchy, "C"): _At.index_by_fourth,
+    (Sellmeier, "B"): _At.of_itself,
+    (Sellmeier, "C"): _At.of_itself,
+    (Abbe, "nd"): _At.of_itself,
+    (Abbe, "V"): _At.of_itself,
+    (Table, "indices"): _At.of_itself,
+    (Spectrum, "values"): _At.one,
 }
 """Rules for fields of a class and its subclasses."""
 BY_NAME: Mapping[str, Callable[[_At], float]] = {
-    "z": _along,
-    "focal_length": _of_itself,
-    "period": _of_itself,
-    "pitch": _of_itself,
-    "decentre": _across,
-    "offset": _across,
-    "middle": _across,
-    "rotation": _rotation,
-    "design_wavelength": _of_itself,
-    "wavelengths": _of_itself,
+    "z": _At.along,
+    "focal_length": _At.of_itself,
+    "period": _At.of_itself,
+    "pitch": _At.of_itself,
+    "decentre": _At.across,
+    "offset": _At.across,
+    "middle": _At.across,
+    "rotation": _At.rotation,
+    "design_wavelength": _At.of_itself,
+    "wavelengths": _At.of_itself,
 }
 """Rules for fields by name, for any class."""
 
@@ -221,7 +203,7 @@ def scale(train: Train, name: str) -> float:
     found = parameter(train, name)
     rule = next(
         (OWN[kind, found.field] for kind in type(found.holder).__mro__ if (kind, found.field) in OWN),
-        BY_NAME.get(found.field, _itself),
+        BY_NAME.get(found.field, _At.itself),
     )
     size = rule(_At(train, found))
     assert math.isfinite(size)
