@@ -18,10 +18,8 @@ from vcc.base.units import short
 from vcc.shapes.patterns import is_grid
 from vcc.shapes.surface import Array, Surface, places
 
-ROWS_AT_ONCE = 16
-"""Rows of a grid of places that are computed together: results for some hundred columns stay in the cache."""
 PLACES_AT_ONCE = 4096
-"""Places that are computed together, likewise."""
+"""Places that are computed together: their results stay in the cache."""
 LARGE_GRID = 4
 """Times the number of places that determine a polynomial: larger grids are interpolated."""
 ROUNDING = 1e-8
@@ -180,16 +178,26 @@ class Zernike(Surface):
         return found
 
     def slopes_back(self, x: Array, y: Array, weights: tuple[Array, Array]) -> Array:
-        """See `Surface`; for the coefficients."""
-        found = np.zeros(len(self.coefficients))
-        for first in range(0, y.size, ROWS_AT_ONCE):
-            rows = slice(first, first + ROWS_AT_ONCE)
-            along_x, along_y = (np.ascontiguousarray(each[rows]) for each in weights)
-            w, argument = self._within_disc(*places(x, y[rows]))
-            for j in range(1, found.size + 1):
-                s, t = _Term.of(j).gradient(w, argument)
-                found[j - 1] += np.vdot(along_x, s) + np.vdot(along_y, t)
-        return found / (self.diameter / 2)
+        """See `Surface`; for the coefficients. The transpose of `slopes`, sum by sum."""
+        terms = [_Term.of(j) for j in range(1, len(self.coefficients) + 1)]
+        sums = [
+            np.zeros(1 + max(term.k for term in terms if term.m == m), np.complex128)
+            for m in range(1 + max(term.m for term in terms))
+        ]
+        flat = [each.reshape(-1) for each in np.broadcast_arrays(x, y, *weights)]
+        for first in range(0, flat[0].size, PLACES_AT_ONCE):
+            across, down, along_x, along_y = (each[first : first + PLACES_AT_ONCE] for each in flat)
+            w, argument = self._within_disc(across, down)
+            around, outwards = along_x + 1j * along_y, 4 * (along_x * w.real + along_y * w.imag)
+            before, power = np.zeros_like(w), np.ones_like(w)
+            for m, found in enumerate(sums):
+                found += _jacobi(found.size, 0, m, argument) @ (m * around * before)
+                steepness = _steepness(found.size, m)
+                found[1:] += steepness * (_jacobi(steepness.size, 1, m + 1, argument) @ (outwards * power))
+                before, power = power, power * w
+        parts = [(term, sums[term.m][term.k]) for term in terms]
+        back = np.array([term.norm * (part.imag if term.sine else part.real) for term, part in parts])
+        return back / (self.diameter / 2)
 
     @property
     def _terms(self) -> list[tuple[int, float]]:
@@ -245,39 +253,20 @@ class _Term:
         n, m = noll(j)
         return cls(math.sqrt(n + 1 if m == 0 else 2 * (n + 1)), (n - m) // 2, m, m > 0 and j % 2 == 1)
 
-    def part(self, angular: NDArray[np.complex128]) -> Array:
-        """Re or Im of wᵐ."""
-        return angular.imag if self.sine else angular.real
-
-    def gradient(self, w: NDArray[np.complex128], argument: Array) -> tuple[Array, Array]:
-        """Its derivatives to x/R and y/R."""
-        from scipy.special import eval_jacobi
-
-        k, m = self.k, self.m
-        s, t = np.zeros(w.shape), np.zeros(w.shape)
-        if m:  # d(wᵐ)/dx = m·wᵐ⁻¹ and d(wᵐ)/dy = i·m·wᵐ⁻¹
-            radial = self.norm * m * eval_jacobi(k, 0, m, argument)
-            slope = w ** (m - 1)
-            s += radial * self.part(slope)
-            t += radial * (slope.real if self.sine else -slope.imag)
-        if k:  # dP_k^(0, m)(z)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z), with dz = 4(x dx + y dy)/R²
-            steepness = self.norm * self.part(w**m) * 2 * (k + m + 1) * eval_jacobi(k - 1, 1, m + 1, argument)
-            s += steepness * w.real
-            t += steepness * w.imag
-        return s, t
-
 
 def _jacobi_sums(coefficients: NDArray[np.complex128], m: int, argument: Array) -> tuple[Waves, Waves]:
-    """Σₖ cₖ·P_k^(0, m) of Jacobi's polynomials, and its derivative.
-
-    dP_k^(0, m)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z).
-    """
+    """Σₖ cₖ·P_k^(0, m) of Jacobi's polynomials, and its derivative."""
     count = coefficients.size
     if not count:
         return np.zeros(argument.shape, np.complex128), np.zeros(argument.shape, np.complex128)
     value = _weighted(coefficients, _jacobi(count, 0, m, argument))
-    steepness = coefficients[1:] * (np.arange(1, count) + m + 1) / 2
+    steepness = coefficients[1:] * _steepness(count, m)
     return value, _weighted(steepness, _jacobi(count - 1, 1, m + 1, argument))
+
+
+def _steepness(count: int, m: int) -> Array:
+    """Factors of the derivatives of P_1, P_2, …: dP_k^(0, m)/dz = (k + m + 1)/2 · P_(k−1)^(1, m+1)(z)."""
+    return (np.arange(1, count) + m + 1) / 2
 
 
 def _weighted(coefficients: NDArray[np.complex128], polynomials: Array) -> Waves:
