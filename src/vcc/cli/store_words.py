@@ -6,6 +6,7 @@ import math
 from itertools import pairwise
 from typing import Any
 
+from vcc.advice.words import distance_in_words
 from vcc.base.showing import spread
 from vcc.base.units import short
 from vcc.base.wavelengths import as_text
@@ -72,15 +73,11 @@ def places_of(grid: Grid, low: float, high: float) -> str:
     """Distances of objects with these disparities, pixels per view along u, as text; also beyond infinity."""
     near, far = grid.distance_of(high), grid.distance_of(low)
     if 0 < near < far:
-        return f"objects {short(near, digits=3)} to {_far(far)} away"
+        return f"objects {short(near, digits=3)} to {distance_in_words(far)} away"
     if near > 0:
         words, beyond = f"objects {short(near, digits=3)} to infinity away", abs(grid.disparity_of(math.inf) - low)
         return words if beyond <= BEYOND else f"{words}, and {beyond:.2g} pixels per view beyond. {WRONG}"
     return f"all beyond infinity: light that a lens has gathered; or {WRONG[0].lower()}{WRONG[1:]}"
-
-
-def _far(distance: float) -> str:
-    return "infinity" if math.isinf(distance) else short(distance, digits=3)
 
 
 def _assumed(provenance: dict[str, Any]) -> dict[str, str]:

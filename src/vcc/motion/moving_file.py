@@ -72,7 +72,9 @@ def _moving(camera: Camera, table: Any, beside: Beside) -> MovingCamera:
     courses, shutter = {}, given.pop(SHUTTER, None)
     for name, each in given.items():
         found = place(camera, name)
-        courses[name] = _course(each, name, partial(_value, type(found.holder), found.field, beside), POINTED)
+        courses[name] = _course(
+            each, name, partial(read_field, type(found.holder), found.field, beside=beside), POINTED
+        )
     gate = None if shutter is None else _course(shutter, SHUTTER, _share, (*POINTED, CODED))
     return MovingCamera(camera, courses, gate)
 
@@ -118,11 +120,6 @@ def _each(given: Any, what: str, noun: str, read: Callable[[Any, str], Any]) -> 
     if not isinstance(given, list):
         raise InputError(f"{what}: {noun}s is {in_toml(given)}: it is a list, as in {EXAMPLE}")
     return [read(each, f"{what}: {noun} {number} of {len(given)}") for number, each in enumerate(given, start=1)]
-
-
-def _value(kind: type, field: str, beside: Beside, given: Any, called: str) -> Any:
-    """The value of a parameter at a time."""
-    return read_field(kind, field, given, called, beside)
 
 
 def _share(given: Any, called: str) -> float:

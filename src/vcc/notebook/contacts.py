@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcc.advice.words import distance_in_words
 from vcc.base.showing import spread
-from vcc.base.units import short
 from vcc.files.pictures import auto_exposure, averaged
 from vcc.light_field import LightField
 from vcc.notebook.html import Panel
@@ -49,7 +49,7 @@ def contact_panel(light_field: LightField | StoredLightField) -> Panel:
 def strip_panel(stack: FocalStack) -> Panel:
     """Images of a focal stack in a row, from the first to the last."""
     chosen = spread(len(stack.pictures), MOST_ACROSS)
-    distances = ", ".join(_away(stack.distances[number]) for number in chosen)
+    distances = ", ".join(distance_in_words(stack.distances[number]) for number in chosen)
     some = f"{len(chosen)} of {len(stack.pictures)}, " if len(chosen) < len(stack.pictures) else ""
     caption = f"{some}focused on {distances}"
     return _panel([list(chosen)], lambda number: stack.pictures[number], caption)
@@ -72,10 +72,6 @@ def _grid_in_words(shape: tuple[int, int], chosen: tuple[list[int], list[int]]) 
     listed = [", ".join(map(str, numbers)) for numbers in chosen]
     several = [f"row{'s' * (len(chosen[0]) > 1)} {listed[0]}", f"column{'s' * (len(chosen[1]) > 1)} {listed[1]}"]
     return f"{len(chosen[0])}×{len(chosen[1])} of {rows}×{columns} views: {' and '.join(several)}, counted from 0"
-
-
-def _away(distance: float) -> str:
-    return "infinity" if math.isinf(distance) else short(distance, digits=3)
 
 
 def _panel(places: Sequence[Sequence[Any]], picture: Callable[[Any], Array | None], caption: str) -> Panel:
