@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.describe import Brief
-from vcc.shapes.patterns import Bounded, Cells, Open, Pattern, is_grid
-from vcc.shapes.stacked_patterns import Product, Shifted, Tiles
+from vcc.shapes.patterns import Bounded, Cells, Open, Pattern, is_grid, overlaps
+from vcc.shapes.stacked_patterns import Product, Shifted, Tiles, numbers_of_borders
 
 Array = NDArray[np.float64]
 
@@ -125,15 +125,5 @@ def tiles_back(tiles: Tiles, places: tuple[Array, Array], size: Sequence[float],
 
 def _overlaps(borders: Array, centres: Array, length: float) -> Any:
     """Share of each interval around a centre covered by each piece between borders: sparse (intervals, pieces)."""
-    from scipy.sparse import csr_array
-
-    low, high, pieces = centres - length / 2, centres + length / 2, len(borders) - 1
-    first = np.searchsorted(borders, low, side="right") - 1
-    last = np.searchsorted(borders, high, side="left")
-    index = first[:, None] + np.arange(max(int((last - first).max(initial=1)), 1))
-    inside = (index >= 0) & (index < pieces)
-    piece = np.clip(index, 0, pieces - 1)
-    share = np.minimum(borders[piece + 1], high[:, None]) - np.maximum(borders[piece], low[:, None])
-    keep = inside & (share > 0)
-    row = np.broadcast_to(np.arange(len(centres))[:, None], index.shape)
-    return csr_array((share[keep] / length, (row[keep], index[keep])), shape=(len(centres), pieces))
+    first, last = (numbers_of_borders(borders, centres + side * length / 2) for side in (-1, 1))
+    return overlaps(first, last, len(borders) - 1) * (np.diff(borders) / length)

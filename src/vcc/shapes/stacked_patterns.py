@@ -130,8 +130,8 @@ class Tiles(Brief, Pattern):
         x, y = np.asarray(x, float), np.asarray(y, float)
         width = max(width, float(np.ptp(self.columns)) * 1e-5)
         height = max(height, float(np.ptp(self.rows)) * 1e-5)
-        left, right = (self._place(self.columns, x + side * width / 2) for side in (-1, 1))
-        top, bottom = (self._place(self.rows, y + side * height / 2) for side in (-1, 1))
+        left, right = (numbers_of_borders(self.columns, x + side * width / 2) for side in (-1, 1))
+        top, bottom = (numbers_of_borders(self.rows, y + side * height / 2) for side in (-1, 1))
         if is_grid(x, y) and not self._worth_an_integral(top, bottom):
             down = overlaps(top.reshape(-1), bottom.reshape(-1), len(self.rows) - 1) * np.diff(self.rows)
             across = overlaps(left.reshape(-1), right.reshape(-1), len(self.columns) - 1) * np.diff(self.columns)
@@ -158,10 +158,10 @@ class Tiles(Brief, Pattern):
         """Whether rectangles, given by first and last row, overlap so much that an integral is faster."""
         return float(np.sum(last - first + 1)) > OVERLAPPING * len(self.rows)
 
-    @staticmethod
-    def _place(borders: Array, at: Array) -> Array:
-        """Places as fractional numbers of borders."""
-        return np.asarray(np.interp(at, borders, np.arange(len(borders), dtype=np.float64)))
+
+def numbers_of_borders(borders: Array, places: Array) -> Array:
+    """Places as fractional numbers of borders, within the first and the last."""
+    return np.asarray(np.interp(places, borders, np.arange(len(borders), dtype=np.float64)))
 
 
 def _between(table: Array, place: Array, axis: int) -> Array:
