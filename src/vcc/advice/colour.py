@@ -50,9 +50,8 @@ def chromatic_pixels(middle: Train, first: Train, last: Train, grid: Grid) -> tu
     """(axial, lateral) colour in pixels, by first-order optics along the wider axis of the sensor.
 
     Axial: the width of the worse of both images of a point on the axis that ``middle`` has in focus, by rays
-        through
-    the views and all rims. Lateral: how far apart they image the edge of the sensor, by rays through the middle of
-    the entrance plane.
+    through the views and all rims. Lateral: how far apart they image the edge of the sensor, by rays through the
+    middle of the entrance plane.
 
     Args:
         middle: the camera at the wavelength that is in focus.

@@ -3,9 +3,9 @@
 ::
 
     [moving]
-    sensor.z = { name = "lines", times = ["0 ms", "90 ms"], values = ["51 mm", "53 mm"] } stop.pattern = {
-    name = "steps", times = ["0 ms", "5 ms"], values = [{ name = "open" }, "code.png"] } shutter = { name =
-    "coded", code = "1101001", exposure = "90 ms" }
+    sensor.z = { name = "lines", times = ["0 ms", "90 ms"], values = ["51 mm", "53 mm"] }
+    stop.pattern = { name = "steps", times = ["0 ms", "5 ms"], values = [{ name = "open" }, "code.png"] }
+    shutter = { name = "coded", code = "1101001", exposure = "90 ms" }
 
 The keys are names of parameters. Their values have the same form as in the element's own table.
 """

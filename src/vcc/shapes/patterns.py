@@ -492,9 +492,9 @@ class CosineSum(Pattern):
     T(x, y) = ∏ over the axes of ½ + (1/2h)·Σₙ cos(2πn·x/period), n = 1 … h (Veeraraghavan et al. 2007,
     section 3, in the separable form that a printed transparency can have).
 
-    period: of the first harmonic, metres: one number, or (x, y), where infinity makes an axis constant.
+    Args:
+        period: of the first harmonic, metres: one number, or (x, y), where infinity makes an axis constant.
         harmonics: h, number of equal cosines along each axis, 1 to 1000.
-        harmonics: h, how many equal cosines along each axis, 1 to 1000.
         phase: radians, added to every first harmonic (n times to the n-th).
     """
 
