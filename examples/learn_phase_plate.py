@@ -288,8 +288,9 @@ def run(
         "learned plate": plate.elements,
     }
     found = {}
+    sharp, _ = comparison.recorded(plain, comparison.focus, noise=0)
     for words, elements in cameras.items():
-        found[words] = comparison.measured(elements, plain, lambda: None)
+        found[words] = comparison.restored(elements, sharp, lambda: None, unfiltered=elements is plain)
         tell(line(words, found[words]))
     return found, pictures(comparison, found, plate)
 

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from vcc.base.units import mm
-from vcc.gallery import cassi, cassi_recovery
+from vcc.gallery import cassi
 from vcc.gallery.cassi_camera import BANDS, Imager
 from vcc.gallery.cassi_recovery import Model
 from vcc.gallery.entry import bench_for, silent
+from vcc.recover.deblur import gradient, gradient_adjoint
 from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Waves
 
@@ -28,8 +29,8 @@ def test_the_model_has_its_adjoint():
 def test_gradients_have_their_adjoint():
     random = np.random.default_rng(0)
     cube, slopes = random.random((3, 7, 9), np.float32), random.random((2, 3, 7, 9), np.float32)
-    ahead = np.vdot(cassi_recovery._gradient(cube), slopes)
-    assert ahead == pytest.approx(np.vdot(cube, cassi_recovery._gradient_adjoint(slopes)), abs=1e-3)
+    ahead = np.vdot(gradient(cube), slopes)
+    assert ahead == pytest.approx(np.vdot(cube, gradient_adjoint(slopes)), abs=1e-3)
 
 
 def test_a_flat_cube_is_recovered_from_a_recording_of_the_model():

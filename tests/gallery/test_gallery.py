@@ -255,7 +255,7 @@ def test_wavefront_coding_runs_on_a_light_field_of_one_s_own():
     )
     run = wavefront.Run(extended_depth.Sizes(depths=3, target=80, rays=200, samples=32))
     result = run(bench_for(fine), silent)
-    with_plate, without = result.numbers[:2]
+    without, with_plate = result.numbers[:2]
     # With the plate, defocus moves a share ψ/(3α) = 1/9 of the light of each axis elsewhere, 1 − (8/9)² = 0.21 of
     # all: if what is moved is spread like the rest, a correlation of 0.79/√(0.79² + 0.21²) = 0.966 is left.
     assert with_plate.value > 0.96

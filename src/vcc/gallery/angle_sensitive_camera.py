@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.camera import Camera
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -261,9 +260,8 @@ def photograph(recorded: Array) -> Array:
 
 def captured(camera: Camera, light_field: LightField, samples: int | None = None) -> Image:
     """A recording; by rays where a number of samples is given."""
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # A few rays pass beside the views at the borders, which are not compared.
-        warnings.simplefilter("ignore", ResultWarning)
         if samples is None:
             return camera.capture(light_field)
         return camera.capture(light_field, method="rays", samples=samples)

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.shapes.directional import AngularFringes
 from vcc.showcase import figures
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -24,7 +20,7 @@ PIECE = 12
 
 def response_figure(
     measured: tuple[Array, Array, Array], tile: Sequence[Sequence[AngularFringes]], aperture: float
-) -> Figure:
+) -> figures.Figure:
     """Responses against the angle, and those of all pixels of a tile over the aperture.
 
     Args:
@@ -41,10 +37,8 @@ def response_figure(
     for each, name, colour, places, values in zip(tile[0], NAMES, COLOURS, angles, found, strict=True):
         axes.plot(np.degrees(fine), each(np.tan(fine), 0.0), color=colour, linewidth=1)
         axes.plot(np.degrees(places), values, "o", color=colour, markersize=3.5, label=f"α = {name}")
-    axes.set_xlabel("angle of incidence θ [degrees]", fontsize=figures.LABEL)
-    axes.set_ylabel("share of the light that is recorded", fontsize=figures.LABEL)
+    figures.label(axes, "angle of incidence θ [degrees]", "share of the light that is recorded")
     axes.set_ylim(0, 1.18)
-    axes.tick_params(labelsize=figures.LABEL - 1)
     axes.legend(ncols=len(NAMES), loc="upper center", frameon=False, fontsize=figures.LABEL)
     slopes = (np.arange(60) / 59 - 0.5) * aperture
     grid = right.subplots(len(tile), len(tile[0]))
@@ -54,9 +48,6 @@ def response_figure(
                 grid[r, c],
                 each(slopes[None, :], slopes[:, None]).astype(np.float32),
                 f"α = {NAMES[c]}" if r == 0 else "",
-                cmap="gray",
-                vmin=0,
-                vmax=1,
             )
         grid[r, 0].set_ylabel(
             f"{np.degrees(row[0].rotation):.0f}°, β = {row[0].frequency:.0f}", fontsize=figures.LABEL
@@ -64,7 +55,7 @@ def response_figure(
     return figure
 
 
-def recording_figure(upright: Array, views: Array, tile: int) -> Figure:
+def recording_figure(upright: Array, views: Array, tile: int) -> figures.Figure:
     """The recording, and the piece in which directions differ most.
 
     Args:
@@ -72,28 +63,19 @@ def recording_figure(upright: Array, views: Array, tile: int) -> Figure:
         views: true views, (v, u, rows, columns, channels).
         tile: pixels across.
     """
-    from matplotlib.patches import Rectangle
     from scipy.ndimage import uniform_filter
 
     differ = uniform_filter(views.var(axis=(0, 1)).mean(axis=2), PIECE, mode="constant")
     half = PIECE // 2
     inside = differ[half:-half, half:-half]
     row, column = (int(n) for n in np.unravel_index(np.argmax(inside), inside.shape))
-    size = PIECE * tile
-    piece = figures.Crop(row * tile, column * tile, size)
+    piece = figures.Crop(row * tile, column * tile, PIECE * tile)
     shown = figures.values_shown(upright)
-    figure = figures.new_figure(11.5, 0.4 + 5.6 * shown.shape[0] / shown.shape[1])
-    whole, part = figure.subplots(1, 2, width_ratios=(shown.shape[1] / shown.shape[0], 1))
     title = f"whole: {shown.shape[0]}×{shown.shape[1]} pixels"
-    figures.put(whole, shown, title).set_interpolation("antialiased")
-    whole.add_patch(
-        Rectangle((piece.column, piece.row), size, size, fill=False, color=figures.ACCENT, linewidth=2)
-    )
-    figures.put(part, piece.of(shown), f"the marked piece: {size // tile}×{size // tile} tiles")
-    return figure
+    return figures.enlarged(shown, piece, (title, f"the marked piece: {PIECE}×{PIECE} tiles"))
 
 
-def views_figure(columns: dict[str, tuple[NDArray[np.floating], Array | None]], white: float) -> Figure:
+def views_figure(columns: dict[str, tuple[NDArray[np.floating], Array | None]], white: float) -> figures.Figure:
     """The views at the left and the right end of the middle row.
 
     Args:
@@ -115,9 +97,7 @@ def views_figure(columns: dict[str, tuple[NDArray[np.floating], Array | None]], 
     return table(rows, ("left view", "right view"))
 
 
-def table(rows: Sequence[Sequence[tuple[str, figures.Shown]]], labels: Sequence[str]) -> Figure:
+def table(rows: Sequence[Sequence[tuple[str, figures.Shown]]], labels: Sequence[str]) -> figures.Figure:
     """Pictures in rows, each below its title."""
     height, width = rows[0][0][1].shape[:2]
-    figure = figures.new_figure(11.5, len(rows) * (11.2 / len(rows[0]) * height / width + 0.3))
-    figures.fill(figure.subplots(len(rows), len(rows[0])), rows, labels)
-    return figure
+    return figures.table((11.5, len(rows) * (11.2 / len(rows[0]) * height / width + 0.3)), rows, labels)

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 
 from vcc.base.measures import decibels, psnr
 from vcc.camera import Camera
+from vcc.gallery import angle_sensitive_camera
 from vcc.gallery import angle_sensitive_figures as drawn
 from vcc.gallery.angle_sensitive_camera import (
     LENSLET,
-    MODULATION,
     PHASES,
-    REGULARISATION,
-    SMOOTHING,
     STEEPEST,
     TILE,
     VIEWS,
@@ -29,14 +27,14 @@ from vcc.gallery.angle_sensitive_camera import (
     photograph,
     through_lenslets,
 )
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.recording import expose_image
 from vcc.recover import refocused
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 
@@ -70,7 +68,12 @@ class Run:
         compared = Compared.of(camera, recording, captured(camera.plenoptic, bench.light_field, self.rays))
         steps()
         numbers = (*_pixel_findings(compared, response), *compared.findings())
-        result = Result(_text(compared), _pictures(compared, response), numbers, bench.assumed)
+        result = Result(
+            prose(__name__, camera=camera, pixels=angle_sensitive_camera),
+            _pictures(compared, response),
+            numbers,
+            bench.assumed,
+        )
         steps()
         return result
 
@@ -257,7 +260,7 @@ def _pixel_findings(compared: Compared, response: tuple[Array, Array, Array]) ->
 def _pictures(compared: Compared, response: tuple[Array, Array, Array]) -> tuple[tuple[Picture, ...], ...]:
     camera, white = compared.camera, compared.white
     rows, columns = camera.tiles
-    pictures = (
+    return below(
         Picture(
             "response",
             "Responses of the pixels",
@@ -298,7 +301,6 @@ def _pictures(compared: Compared, response: tuple[Array, Array, Array]) -> tuple
             ),
         ),
     )
-    return tuple((each,) for each in pictures)
 
 
 def _refocused_rows(compared: Compared) -> list[list[tuple[str, figures.Shown]]]:
@@ -312,20 +314,6 @@ def _refocused_rows(compared: Compared) -> list[list[tuple[str, figures.Shown]]]
             row.append((title, figures.values_shown(compared.refocused[name][place], compared.white)))
         rows.append(row)
     return rows
-
-
-def _text(compared: Compared) -> str:
-    return paragraphs(
-        "gallery/prose/angle-sensitive-pixels.txt",
-        camera=compared.camera,
-        views=VIEWS,
-        tile=TILE,
-        modulation=MODULATION,
-        border=BORDER,
-        lenslet=LENSLET,
-        smoothing=SMOOTHING,
-        regularisation=REGULARISATION,
-    )
 
 
 ENTRY = Entry(

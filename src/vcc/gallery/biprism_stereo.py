@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, below, prose
 from vcc.optics import Biprism, Lens
 from vcc.optics.sensor import Sensor
 from vcc.recover import BiprismStereo, StereoDepth, depth_by_biprism
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
-from vcc.showcase.words import away, paragraphs
+from vcc.showcase.words import away
 from vcc.sources import PlanesScene
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -57,18 +53,16 @@ def run(bench: Bench, progress: Progress) -> Result:
     else:
         numbers = [Finding("blocks that match", "", 0.0, "", None, "the views hold too little texture")]
     recording = figures.shown(image, stereo.behind**2 / (math.pi / 4 * OPENING**2))
-    pictures = (
-        (Picture("recording", "The recording", "Upright: each half shows the scene once.", recording),),
-        (
-            Picture(
-                "depth",
-                "Distance from disparity",
-                "Where blocks of the two halves match; grey elsewhere.",
-                _depth_figure(recording, depth, trusted, (bench.near, bench.far)),
-            ),
+    pictures = below(
+        Picture("recording", "The recording", "Upright: each half shows the scene once.", recording),
+        Picture(
+            "depth",
+            "Distance from disparity",
+            "Where blocks of the two halves match; grey elsewhere.",
+            _depth_figure(recording, depth, trusted, (bench.near, bench.far)),
         ),
     )
-    text = paragraphs("gallery/prose/biprism-stereo.txt", stereo=stereo, bench=bench, opening=OPENING)
+    text = prose(__name__, stereo=stereo, bench=bench)
     return Result(text, pictures, tuple(numbers), bench.assumed)
 
 
@@ -149,7 +143,7 @@ def shows_only(scene: PlanesScene, camera: Camera, number: int, rows: Array, col
 
 def _depth_figure(
     recording: figures.Shown, depth: StereoDepth, trusted: NDArray[np.bool_], ends: tuple[float, float]
-) -> Figure:
+) -> figures.Figure:
     figure = figures.new_figure(4.6, 4.6)
     picture, axes = figure.subplots(1, 2)
     # The blocks lie on the half at x > 0 of the sensor: the left half of the upright image.

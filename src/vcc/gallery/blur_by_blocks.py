@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,6 @@ from vcc.recover import (
 )
 from vcc.shapes.patterns import Circle, Open
 from vcc.showcase.bench import APERTURE, Bench
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

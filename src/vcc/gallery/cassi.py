@@ -11,16 +11,10 @@ import numpy as np
 
 from vcc.base.measures import psnr
 from vcc.base.units import nm
-from vcc.gallery import flat_target
+from vcc.gallery import cassi_camera, flat_target
 from vcc.gallery.cassi_camera import (
     BANDS,
-    DISTANCE,
-    ELECTRONICS,
     EVEN,
-    MIDDLE,
-    OBJECTIVE,
-    PITCH,
-    RELAY,
     SHEAR,
     WAVELENGTHS,
     Array,
@@ -29,11 +23,10 @@ from vcc.gallery.cassi_camera import (
 )
 from vcc.gallery.cassi_figures import NAMES, pictures
 from vcc.gallery.cassi_recovery import Floats, Model, Recovered
-from vcc.gallery.entry import Entry, Finding, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Progress, Result, Steps, prose
 from vcc.image import Image
 from vcc.recording import expose_image
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
 
 WEIGHT = 0.03
 """Of total variation."""
@@ -91,7 +84,12 @@ class Run:
             advance()
         found = Recovered(imager, truth, noisy, cubes, places, even_error, model_error)
         advance()
-        return Result(_text(found, self.steps), pictures(found), _findings(found), bench.assumed)
+        return Result(
+            prose(__name__, optics=cassi_camera, found=found, nm=nm, steps=self.steps),
+            pictures(found),
+            _findings(found),
+            bench.assumed,
+        )
 
     @staticmethod
     def _with_noise(imager: Imager, image: Image, **parts: bool) -> Array:
@@ -116,27 +114,6 @@ def whole_pixel_error(scene: Array, shape: tuple[int, int]) -> float:
 
 def _bands_first(cube: Array) -> Floats:
     return np.ascontiguousarray(np.moveaxis(cube, -1, 0), dtype=np.float32)
-
-
-def _text(found: Recovered, steps: int) -> str:
-    return paragraphs(
-        "gallery/prose/cassi.txt",
-        imager=found.imager,
-        objective=OBJECTIVE,
-        relay=RELAY,
-        distance=DISTANCE,
-        pitch=PITCH,
-        bands=BANDS,
-        shear=SHEAR,
-        nm=nm,
-        wavelengths=WAVELENGTHS,
-        middle=MIDDLE,
-        electronics=ELECTRONICS,
-        open=float(found.imager.code.mean()),
-        model=found.model_error,
-        weight=WEIGHT,
-        steps=steps,
-    )
 
 
 def _findings(found: Recovered) -> tuple[Finding, ...]:
@@ -177,13 +154,13 @@ def _findings(found: Recovered) -> tuple[Finding, ...]:
         Finding("cube from one recording without noise, PSNR", "", decibels["clean"], "dB"),
         Finding("cube from one recording with noise, PSNR", "", noisy, "dB", why=f"{BANDS} bands from one image"),
         *(
-            Finding(
+            Finding.gain(
                 f"the same: gain over a camera without {part}",
-                f"both are needed: {LEAST_GAIN:g} dB or more",
-                noisy - decibels[f"no {part}"],
-                "dB",
-                noisy - decibels[f"no {part}"] >= LEAST_GAIN,
-                f"{noisy:.1f} dB against {decibels[f'no {part}']:.1f} dB: {why}",
+                noisy,
+                decibels[f"no {part}"],
+                LEAST_GAIN,
+                why,
+                "both are needed",
             )
             for part, why in (
                 ("code", "bands differ by a shift alone, which smooth places do not show"),
@@ -205,12 +182,7 @@ def _findings(found: Recovered) -> tuple[Finding, ...]:
             "dB",
             why="models with one pixel a band do not fit a prism of glass",
         ),
-        Finding(
-            "recovered by true shears, rounded to whole pixels: loss",
-            "",
-            noisy - decibels["rounded"],
-            "dB",
-        ),
+        Finding("recovered by true shears, rounded to whole pixels: loss", "", noisy - decibels["rounded"], "dB"),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
-from vcc.base.errors import ResultWarning
+from vcc.base.errors import without_result_warnings
 from vcc.base.units import mm, nm, um
 from vcc.camera import Camera
+from vcc.gallery.flat_target import flat
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, Prism
@@ -139,16 +139,12 @@ class Imager:
         """The light of a flat scene, (rows, columns, bands), at the objective, a little wider than the code."""
         around = (MARGIN, MARGIN) if self.interpolation == "linear" else (0, 0)
         wide = np.pad(cube, (around, around, (0, 0)), mode="edge")
-        views = np.ascontiguousarray(wide[None, None], dtype=np.float32)
-        slope = PITCH / self.to_code
-        made = LightField.from_views(views, PUPIL, slope, DISTANCE, disparity_range=(0.0, 0.0))
-        return made.with_wavelengths(WAVELENGTHS)
+        return flat(wide, PUPIL, PITCH / self.to_code, DISTANCE, views=1).with_wavelengths(WAVELENGTHS)
 
     def image(self, cube: NDArray[np.floating], **parts: bool) -> Image:
         """The irradiance of a scene; upright, since the relay inverts the image of the objective once more."""
-        with warnings.catch_warnings():
+        with without_result_warnings():
             # Cells of the code end where samples end: `recorded_code` shows what is lost at their edges.
-            warnings.simplefilter("ignore", ResultWarning)
             return self.camera(**parts).capture(
                 self.field(cube), interpolation=self.interpolation, refine=self.refine
             )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vcc.base.cached import cached
 from vcc.base.measures import psnr
 from vcc.gallery.cassi_camera import SHEAR, Array, Imager
+from vcc.recover.deblur import gradient, gradient_adjoint
 
 Floats = NDArray[np.float32]
 
@@ -83,29 +84,12 @@ class Model:
         cube = self.transpose(wanted / shared)
         slopes = np.zeros((2, *cube.shape), np.float32)
         for _ in range(steps):
-            new = cube - step * (self.transpose((self(cube) - wanted) / shared) + _gradient_adjoint(slopes))
+            new = cube - step * (self.transpose((self(cube) - wanted) / shared) + gradient_adjoint(slopes))
             np.maximum(new, 0, out=new)
-            slopes += dual_step * _gradient(2 * new - cube)
+            slopes += dual_step * gradient(2 * new - cube)
             slopes /= np.maximum(1, np.sqrt(np.einsum("abrc,abrc->rc", slopes, slopes)) / np.float32(weight))
             cube = new
         return np.asarray(np.moveaxis(cube, 0, -1), dtype=np.float64)
-
-
-def _gradient(cube: Floats) -> Floats:
-    """Differences along rows and along columns of (bands, rows, columns): (2, bands, rows, columns)."""
-    made = np.zeros((2, *cube.shape), np.float32)
-    made[0, :, :-1] = cube[:, 1:] - cube[:, :-1]
-    made[1, :, :, :-1] = cube[:, :, 1:] - cube[:, :, :-1]
-    return made
-
-
-def _gradient_adjoint(slopes: Floats) -> Floats:
-    made = np.zeros(slopes.shape[1:], np.float32)
-    made[:, 1:] += slopes[0, :, :-1]
-    made[:, :-1] -= slopes[0, :, :-1]
-    made[:, :, 1:] += slopes[1, :, :, :-1]
-    made[:, :, :-1] -= slopes[1, :, :, :-1]
-    return made
 
 
 @dataclass(frozen=True, eq=False)

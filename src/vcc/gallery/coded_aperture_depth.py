@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
 from vcc.base.measures import decibels
+from vcc.gallery import blur_by_blocks
 from vcc.gallery.blur_by_blocks import (
-    EXPONENT,
     FULL,
-    LIGHT,
-    MARGIN,
-    NOISE,
     RIGHT,
     Found,
     Setup,
@@ -30,17 +27,14 @@ from vcc.gallery.blur_by_blocks import (
     is_right,
     probability,
 )
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, prose
 from vcc.recover import (
     DefocusDepth,
     depth_by_plane_sweep,
 )
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -128,15 +122,7 @@ class Run:
         else:
             truth = Truth.of(bench, setup, coded.depth)
             numbers = [*_against_truth(setup, found, truth), *_sharpness(setup, coded, sharp, truth)]
-        text = paragraphs(
-            "gallery/prose/coded-aperture-depth.txt",
-            setup=setup,
-            used=used,
-            margin=MARGIN,
-            noise=NOISE,
-            light=LIGHT,
-            exponent=EXPONENT,
-        )
+        text = prose(__name__, blur_by_blocks=blur_by_blocks, setup=setup, used=used)
         return Result(text, _pictures(setup, found, sharp, truth), tuple(numbers), bench.assumed)
 
 
@@ -284,7 +270,7 @@ def _against_views(bench: Bench, setup: Setup, coded: Found) -> list[Finding]:
     ]
 
 
-def _depth_figure(setup: Setup, found: dict[str, Found], truth: Truth | None) -> Figure:
+def _depth_figure(setup: Setup, found: dict[str, Found], truth: Truth | None) -> figures.Figure:
     from matplotlib.colors import Normalize
 
     columns = 3 if truth is None else 4
@@ -313,27 +299,18 @@ def _depth_figure(setup: Setup, found: dict[str, Found], truth: Truth | None) ->
     return figure
 
 
-def _kernel_figure(setup: Setup, found: dict[str, Found]) -> Figure:
+def _kernel_figure(setup: Setup, found: dict[str, Found]) -> figures.Figure:
     places = np.linspace(0, len(setup.candidates) - 1, 5).round().astype(int)
+    distances = [setup.candidates[place] for place in places]
+    titles = [f"{away(distance)}: {setup.blur(distance):.1f} pixels" for distance in distances]
     rows = [
         [
-            (_kernel_title(setup, place) if row == 0 else "", _upright_kernel(each.kernels[place]))
-            for place in places
+            ("" if row else title, each.kernels[place][::-1, ::-1] / each.kernels[place].max())
+            for title, place in zip(titles, places, strict=True)
         ]
         for row, each in enumerate(found.values())
     ]
-    figure = figures.new_figure(9.0, 1.9 * len(found))
-    figures.fill(figure.subplots(len(found), len(places)), rows, list(found), cmap="gray")
-    return figure
-
-
-def _kernel_title(setup: Setup, place: int) -> str:
-    distance = setup.candidates[place]
-    return f"{away(distance)}: {setup.blur(distance):.1f} pixels"
-
-
-def _upright_kernel(kernel: Array) -> NDArray[np.float32]:
-    return np.asarray((kernel / kernel.max())[::-1, ::-1], dtype=np.float32)
+    return figures.table((9.0, 1.9 * len(found)), rows, list(found))
 
 
 ENTRY = Entry(

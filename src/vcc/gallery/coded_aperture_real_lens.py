@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,10 @@ from vcc.base.errors import InputError
 from vcc.base.measures import psnr
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.flat_target import grey_view
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
+from vcc.gallery.flat_target import flat, grey_view
 from vcc.gallery.published_codes import ZHOU_NAYAR
 from vcc.gallery.real_lens import LENS, PUPIL, WAVELENGTH, WIDTH, discs
-from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, RealLens
 from vcc.optics.sensor import Sensor
 from vcc.prescriptions import load_lens
@@ -28,10 +26,6 @@ from vcc.recover import wiener
 from vcc.shapes.patterns import Cells, Circle, Pattern
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -126,9 +120,7 @@ class Apertures:
         slope, (right, down) = self.pitch / self._pupil[1], spread.field
         found = []
         for values, count in ((target, rays), (np.ones_like(target), max(rays // 16, 16))):
-            # All views of a flat target are the same, if they converge on it.
-            views = np.broadcast_to(values.astype(np.float32), (VIEWS, VIEWS, *values.shape))
-            light = LightField.from_views(views, WIDTH / VIEWS, slope, DISTANCE, disparity_range=(0.0, 0.0))
+            light = flat(values, WIDTH / VIEWS, slope, DISTANCE, VIEWS)
             moved = light.transformed(Affine.translation(0, 0, -right, -down))
             image = camera.capture(moved, between_views="none", samples=count)
             found.append(image.to_numpy().astype(np.float64).reshape(rows, columns))
@@ -217,17 +209,10 @@ class Run:
                     shown[f_number][name, place] = Seen(spread.values, recording, truth)
                     step()
             numbers += _findings(lens, spreads[f_number], shown[f_number])
-        text = paragraphs(
-            "gallery/prose/coded-aperture-real-lens.txt",
-            focus=FOCUS,
-            distance=DISTANCE,
-            blur=BLUR,
-            noise=NOISE,
-            light=float(ZHOU_NAYAR.mean()),
-        )
-        pictures = (
-            (Picture("psf", "Images of a point", _PSF, _psf_figure(spreads)),),
-            (Picture("deblurred", "Deblurred targets", _DEBLURRED, _deblurred_figure(spreads, shown)),),
+        text = prose(__name__, light=float(ZHOU_NAYAR.mean()))
+        pictures = below(
+            Picture("psf", "Images of a point", _PSF, _psf_figure(spreads)),
+            Picture("deblurred", "Deblurred targets", _DEBLURRED, _deblurred_figure(spreads, shown)),
         )
         return Result(text, pictures, tuple(numbers), bench.assumed)
 
@@ -359,9 +344,7 @@ _PSF = (
 _DEBLURRED = "As light lands, in linear light: the code’s recordings, deblurred with the kernels of both lenses."
 
 
-def _psf_figure(spreads: dict[float, dict[tuple[str, str], PointSpread]]) -> Figure:
-    figure = figures.new_figure(8.6, 4.3 * len(spreads))
-    grid = figure.subplots(2 * len(spreads), 4)
+def _psf_figure(spreads: dict[float, dict[tuple[str, str], PointSpread]]) -> figures.Figure:
     places = ("thin", *FIELDS)
     titles = ("thin lens", "real lens: axis", "half-way", "corner")
     rows = [
@@ -372,8 +355,7 @@ def _psf_figure(spreads: dict[float, dict[tuple[str, str], PointSpread]]) -> Fig
         for row, (found, name) in enumerate((found, name) for found in spreads.values() for name in OPENINGS)
     ]
     labels = [f"f/{f_number:g}, {name}" for f_number in spreads for name in OPENINGS]
-    figures.fill(grid, rows, labels, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((8.6, 4.3 * len(spreads)), rows, labels)
 
 
 def _brightest(values: Array) -> Array:
@@ -382,8 +364,7 @@ def _brightest(values: Array) -> Array:
 
 def _deblurred_figure(
     spreads: dict[float, dict[tuple[str, str], PointSpread]], shown: dict[float, dict[tuple[str, str], Seen]]
-) -> Figure:
-    figure = figures.new_figure(8.6, 4.4 * len(shown))
+) -> figures.Figure:
     rows: list[list[tuple[str, figures.Shown]]] = []
     labels = []
     for f_number, found in shown.items():
@@ -399,8 +380,7 @@ def _deblurred_figure(
                 ]
             )
             labels.append(f"f/{f_number:g}, {place}")
-    figures.fill(figure.subplots(len(rows), 4), rows, labels, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((8.6, 4.4 * len(shown)), rows, labels)
 
 
 ENTRY = Entry(

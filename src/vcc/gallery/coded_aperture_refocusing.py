@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from vcc.analysis import psf
 from vcc.base.measures import psnr
 from vcc.camera import Camera
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, below, prose
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.optics import Lens, Mask
@@ -24,10 +23,7 @@ from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
 from vcc.showcase.scene import MIDDLE
-from vcc.showcase.words import away, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 
@@ -155,7 +151,12 @@ class Run:
         numbers = (*_findings(deblurred, recordings.target), *_scene_findings(scene), _photon_finding(photons))
         pictures = _pictures(recordings, deblurred, gains)
         shown = (*pictures[:2], *([] if scene is None else _scene_pictures(scene)), *pictures[2:])
-        return Result(_text(bench, refocusing), shown, numbers, bench.assumed)
+        return Result(
+            prose(__name__, bench=bench, refocusing=refocusing, flat_target=flat_target),
+            shown,
+            numbers,
+            bench.assumed,
+        )
 
     def _deblurred(self, recordings: Recordings, name: str, progress: Progress) -> Deblurred:
         white, spread, noise = recordings.exposed(name, additive(NOISE))
@@ -188,8 +189,7 @@ def _findings(deblurred: dict[str, Deblurred], target: Array) -> list[Finding]:
 
 def _gain_finding(what: str, ours: float, best: float, without: float) -> Finding:
     """The gain of the mask over the best result of the open aperture, which has ``without`` as recorded."""
-    why = f"{ours:.1f} dB against {best:.1f} dB ({without:.1f} dB as recorded)"
-    return Finding(what, "2 dB or more at the same noise", ours - best, "dB", ours - best >= 2, why)
+    return Finding.gain(what, ours, best, 2, f"{without:.1f} dB as recorded", "at the same noise")
 
 
 def _photon_finding(gain: float) -> Finding:
@@ -204,53 +204,30 @@ def _photon_finding(gain: float) -> Finding:
     )
 
 
-def _text(bench: Bench, refocusing: Refocusing) -> str:
-    return paragraphs(
-        "gallery/prose/coded-aperture-refocusing.txt",
-        bench=bench,
-        refocusing=refocusing,
-        focal_length=flat_target.FOCAL_LENGTH,
-        focus=flat_target.FOCUS,
-        target=flat_target.DISTANCE,
-        opening=OPENING,
-        blur=BLUR,
-        cells=CELLS,
-        noise=NOISE,
-        misfit=MISFIT,
-        aperture=APERTURE,
-    )
-
-
 def _pictures(
     recordings: Recordings, deblurred: dict[str, Deblurred], gains: dict[float, float]
-) -> list[tuple[Picture, ...]]:
-    return [
-        (
-            Picture(
-                "psf",
-                "The blur of a point and its spectrum",
-                "The open aperture’s MTF has lines of zeros, where detail is lost; the mask’s has few of them.",
-                _spectra_figure(recordings.masks),
-            ),
+) -> tuple[tuple[Picture, ...], ...]:
+    return below(
+        Picture(
+            "psf",
+            "The blur of a point and its spectrum",
+            "The open aperture’s MTF has lines of zeros, where detail is lost; the mask’s has few of them.",
+            _spectra_figure(recordings.masks),
         ),
-        (
-            Picture(
-                "target",
-                "A flat target out of focus, recorded and deblurred",
-                "Decibels are those of the whole target. Exposure time and noise are the same for both.",
-                _target_figure(deblurred, recordings.target),
-            ),
+        Picture(
+            "target",
+            "A flat target out of focus, recorded and deblurred",
+            "Decibels are those of the whole target. Exposure time and noise are the same for both.",
+            _target_figure(deblurred, recordings.target),
         ),
-        (
-            Picture(
-                "noise",
-                "Gain over noise",
-                "By the Wiener filter, which knows the noise; the open aperture’s picture is the recording where "
-                "that is better.",
-                _noise_figure(gains),
-            ),
+        Picture(
+            "noise",
+            "Gain over noise",
+            "By the Wiener filter, which knows the noise; the open aperture’s picture is the recording where "
+            "that is better.",
+            _noise_figure(gains),
         ),
-    ]
+    )
 
 
 # --- the scene ---
@@ -395,7 +372,7 @@ def _middle(picture: figures.Shown) -> figures.Crop:
     return figures.Crop((picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2, side)
 
 
-def _spectra_figure(masks: dict[str, Mask]) -> Figure:
+def _spectra_figure(masks: dict[str, Mask]) -> figures.Figure:
     figure = figures.new_figure(11.0, 3.1)
     grid = figure.subplots(1, 4)
     for place, (name, mask) in enumerate(masks.items()):
@@ -425,7 +402,7 @@ def _spectra_figure(masks: dict[str, Mask]) -> Figure:
     return figure
 
 
-def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> Figure:
+def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> figures.Figure:
     side = min(*target.shape, 160)
     top, left = ((n - side) // 2 for n in target.shape)
 
@@ -438,22 +415,18 @@ def _target_figure(deblurred: dict[str, Deblurred], target: Array) -> Figure:
         pictures = [(f"{name}, {words}", getattr(found, kind)) for kind, words in kinds]
         rows.append([(f"{words}: {psnr(each, target, peak=1.0):.1f} dB", part(each)) for words, each in pictures])
     rows[0].append(("true", part(target)))
-    figure = figures.new_figure(10.5, 5.8)
-    figures.fill(figure.subplots(2, 4), rows, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((10.5, 5.8), rows)
 
 
-def _noise_figure(gains: dict[float, float]) -> Figure:
+def _noise_figure(gains: dict[float, float]) -> figures.Figure:
     figure = figures.new_figure(6.5, 3.4)
     axes = figure.subplots()
     percent, measured = 100 * np.array(list(gains)), list(gains.values())
     axes.semilogx(percent, measured, "o-", color=figures.ACCENT, linewidth=1.4, label="measured")
     axes.axhline(2, color=figures.QUIET, linewidth=0.9, linestyle=(0, (6, 4)), label="what counts as reached")
     axes.axhline(0, color=figures.INK, linewidth=0.9)
-    axes.set_xlabel("noise [% of white through the open aperture]", fontsize=figures.LABEL)
-    axes.set_ylabel("gain of the mask [dB]", fontsize=figures.LABEL)
+    figures.label(axes, "noise [% of white through the open aperture]", "gain of the mask [dB]")
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.tick_params(labelsize=figures.LABEL)
     axes.grid(True, linewidth=0.4)
     axes.legend(fontsize=figures.LABEL, frameon=False)
     return figure

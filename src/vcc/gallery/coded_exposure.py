@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from vcc.base.affine import Affine
 from vcc.base.units import mm, ms
 from vcc.camera import Camera
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.gallery.extended_depth import BORDER, inner, psnr
 from vcc.light_field import LightField
 from vcc.motion import MovingCamera, coded
@@ -27,15 +26,13 @@ from vcc.recover import wiener
 from vcc.shapes.patterns import Circle
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
 CODE = "1010000111000001010000110011110111010111001001100111"
 """The paper's code, of 52 parts, half of them open."""
+LIGHT = CODE.count("1") / len(CODE)
+"""Share of the light that it passes."""
 CHOP = 1 * ms
 """Duration of each part, seconds."""
 PUPIL = 2 * mm
@@ -99,8 +96,7 @@ class Moving:
 
     def scene(self, flat: Array) -> Callable[[float], LightField]:
         """A flat object that moves by a pixel per `CHOP`, at whole pixels in the middle of each part."""
-        views = np.ascontiguousarray(np.broadcast_to(flat.astype(np.float32), (2, 2, *flat.shape)))
-        field = LightField.from_views(views, 2 * PUPIL, self.slope, DISTANCE, disparity_range=(0.0, 0.0))
+        field = flat_target.flat(flat, 2 * PUPIL, self.slope, DISTANCE)
 
         def at(time: float) -> LightField:
             moved = (time / CHOP - 0.5 - len(CODE) // 2) * self.slope
@@ -158,24 +154,10 @@ class Run:
         for name, code in SHUTTERS.items():
             found[name] = moving.taken(flat, code)
             advance()
-        return Result(_text(moving), _pictures(found), _findings(found), bench.assumed)
-
-
-def _text(moving: Moving) -> str:
-    return paragraphs(
-        "gallery/prose/coded-exposure.txt",
-        moving=moving,
-        pupil=PUPIL,
-        distance=DISTANCE,
-        parts=len(CODE),
-        chop=CHOP,
-        light=CODE.count("1") / len(CODE),
-        noise=NOISE,
-    )
+        return Result(prose(__name__, moving=moving), _pictures(found), _findings(found), bench.assumed)
 
 
 def _pictures(found: dict[str, Taken]) -> tuple[tuple[Picture, ...], ...]:
-    figure = figures.new_figure(9.0, 6.4)
     rows = [
         [
             (NAMES[name], figures.grey_shown(inner(each.recorded, 0.5 * BORDER, math.floor)))
@@ -186,35 +168,32 @@ def _pictures(found: dict[str, Taken]) -> tuple[tuple[Picture, ...], ...]:
             for each in found.values()
         ],
     ]
-    figures.fill(
-        figure.subplots(2, 3, squeeze=False), rows, ("as recorded", "deblurred"), cmap="gray", vmin=0, vmax=1
-    )
-    words = "All in the same light with the same noise of the electronics; brightness is made alike."
-    return (
-        (Picture("target", "A target that moves by 52 pixels", words, figure),),
-        (
-            Picture(
-                "contrast",
-                "What is left of waves along the way",
-                "From the picture of a bright line that moves. Each zero of the open shutter is a frequency that "
-                "no filter brings back.",
-                _contrast_figure(found),
-            ),
+    return below(
+        Picture(
+            "target",
+            "A target that moves by 52 pixels",
+            "All in the same light with the same noise of the electronics; brightness is made alike.",
+            figures.table((9.0, 6.4), rows, ("as recorded", "deblurred")),
+        ),
+        Picture(
+            "contrast",
+            "What is left of waves along the way",
+            "From the picture of a bright line that moves. Each zero of the open shutter is a frequency that "
+            "no filter brings back.",
+            _contrast_figure(found),
         ),
     )
 
 
-def _contrast_figure(found: dict[str, Taken]) -> Figure:
+def _contrast_figure(found: dict[str, Taken]) -> figures.Figure:
     figure = figures.new_figure(9.0, 3.4)
     axes = figure.subplots()
     for (name, each), colour in zip(found.items(), ("#9aa0a6", "#d95f02", "#1b6ca8"), strict=True):
         contrast = np.maximum(each.contrast, 1e-4)
         axes.semilogy(np.linspace(0, 0.5, len(contrast)), contrast, label=NAMES[name], color=colour, linewidth=1.3)
-    axes.set_xlabel("cycles per pixel", fontsize=figures.LABEL)
-    axes.set_ylabel("contrast", fontsize=figures.LABEL)
+    figures.label(axes, "cycles per pixel", "contrast")
     axes.set_xlim(0, 0.5)
     axes.set_ylim(1e-3, 1.2)
-    axes.tick_params(labelsize=figures.LABEL - 1)
     figure.legend(frameon=False, fontsize=figures.LABEL, loc="outside upper center", ncols=len(found))
     return figure
 
@@ -222,9 +201,7 @@ def _contrast_figure(found: dict[str, Taken]) -> Figure:
 def _findings(found: dict[str, Taken]) -> tuple[Finding, ...]:
     # Relative to a short exposure, to exclude the losses by sampling and by the motion within a part.
     lowest = {name: float((found[name].contrast / found["short"].contrast).min()) for name in ("coded", "open")}
-    over_open = found["coded"].decibels - found["open"].decibels
-    over_short = found["coded"].decibels - found["short"].decibels
-    coded_words = f"{found['coded'].decibels:.1f} dB against"
+    decibels = {name: each.decibels for name, each in found.items()}
     return (
         Finding(
             "lowest contrast over all frequencies, shutter fluttering",
@@ -242,21 +219,21 @@ def _findings(found: dict[str, Taken]) -> tuple[Finding, ...]:
             lowest["open"] < LOST,
             "a box has zeros",
         ),
-        Finding(
+        Finding.gain(
             "deblurred target: gain over the open shutter",
-            f"deblurring becomes well-posed: {LEAST_GAIN:g} dB or more",
-            over_open,
-            "dB",
-            over_open >= LEAST_GAIN,
-            f"{coded_words} {found['open'].decibels:.1f} dB, with half of the light",
+            decibels["coded"],
+            decibels["open"],
+            LEAST_GAIN,
+            "with half of the light",
+            "deblurring becomes well-posed",
         ),
-        Finding(
+        Finding.gain(
             "deblurred target: gain over a short exposure",
-            f"less noise than a short exposure: {LEAST_GAIN:g} dB or more",
-            over_short,
-            "dB",
-            over_short >= LEAST_GAIN,
-            f"{coded_words} {found['short'].decibels:.1f} dB, with {CODE.count('1')} times the light",
+            decibels["coded"],
+            decibels["short"],
+            LEAST_GAIN,
+            f"with {CODE.count('1')} times the light",
+            "less noise than a short exposure",
         ),
     )
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.cached import cached
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.base.measures import psnr
 from vcc.base.units import mm
 from vcc.camera import Camera
 from vcc.gallery.diffusercam import drawn
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.gallery.light_field_atoms import FINE, VIEWS, Effort, atoms, reconstructed, sparsely_coded
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -29,7 +27,6 @@ from vcc.recording import expose_image
 from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
 
 Array = NDArray[Any]
 
@@ -138,12 +135,12 @@ class Scene:
 
     def captured(self, camera: Camera) -> Image:
         """The irradiance through all views that there are."""
-        with _as_measured():
+        with without_result_warnings():  # on masks finer than samples: a run measures that error
             return camera.capture(self.field, between_views="none", interpolation="nearest", refine=8)
 
     def weights(self, camera: Camera) -> Array:
         """The share of each sample that reaches its pixel, white through the open lens 1, as `truth`."""
-        with _as_measured():
+        with without_result_warnings():  # on masks finer than samples: a run measures that error
             op = camera.operator(self.coarse, between_views="none", interpolation="nearest", refine=1)
         weights = op.T(np.ones(op.picture_shape)).reshape(self.truth.shape)
         return np.asarray(weights * self.lens.sensor.z**2 / (VIEWS * self.spacing) ** 2)
@@ -167,14 +164,6 @@ class Scene:
         """Sizes of the bases: parallaxes that cover the disparities, and one step more."""
         low, high = self.disparities
         return Effort(parallaxes=tuple(range(-math.ceil(FINE * high) - 1, -math.floor(FINE * low) + 2)))
-
-
-@contextmanager
-def _as_measured() -> Iterator[None]:
-    """Without warnings that masks are finer than samples and views: a run measures that error by rays."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ResultWarning)
-        yield
 
 
 def codes(shape: tuple[int, int]) -> dict[str, Array]:
@@ -350,7 +339,10 @@ class Run:
         measured = Measured(scene, images, views, error, shift, penalty, away)
         advance()
         return Result(
-            _text(self, measured, effort), _pictures(measured), tuple(_findings(measured)), bench.assumed
+            prose(__name__, run=self, measured=measured, scene=scene, effort=effort),
+            _pictures(measured),
+            tuple(_findings(measured)),
+            bench.assumed,
         )
 
 
@@ -404,29 +396,6 @@ def fewer_pixels(truth: Array) -> Array:
     )
 
 
-def _text(run: Run, measured: Measured, effort: Effort) -> str:
-    scene = measured.scene
-    return paragraphs(
-        "gallery/prose/compressive-light-field.txt",
-        run=run,
-        views=VIEWS,
-        shape=scene.truth.shape[2:],
-        finer=scene.field.shape[0],
-        lens=VIEWS * scene.spacing,
-        focal_length=scene.focal_length,
-        disparities=scene.disparities,
-        away=measured.away,
-        shift=measured.shift,
-        shifts=SHIFTS,
-        pitch=scene.lens.sensor.pitches[1],
-        effort=effort,
-        fine=FINE,
-        penalty=measured.penalty,
-        electronics=ELECTRONICS,
-        spread=550e-9 * measured.away / scene.lens.sensor.pitches[1],
-    )
-
-
 def _findings(measured: Measured) -> Iterator[Finding]:
     difference, sampling = measured.error
     yield Finding(
@@ -446,38 +415,25 @@ def _findings(measured: Measured) -> Iterator[Finding]:
         ("lenslets", f"views of one pixel in {VIEWS}×{VIEWS}, without noise", "the resolution behind lenslets"),
         ("sparse", "sparse coding with the same atoms (ℓ1, FISTA)", "atoms of all parallaxes may mix in a patch"),
     ):
-        other = measured.decibels(name)
-        claimed = name != "sparse"
-        yield Finding(
-            f"the same: gain over {words}",
-            f"{LEAST_GAIN:g} dB or more" if claimed else "",
-            coded - other,
-            "dB",
-            coded - other >= LEAST_GAIN if claimed else None,
-            f"{coded:.1f} dB against {other:.1f} dB: {why}",
-        )
-    gain = measured.decibels("sparse") - measured.decibels("repeated")
-    yield Finding(
+        gain = Finding.gain(f"the same: gain over {words}", coded, measured.decibels(name), LEAST_GAIN, why)
+        yield replace(gain, claim="", reached=None) if name == "sparse" else gain
+    yield Finding.gain(
         "sparse coding (ℓ1) with these atoms: gain over the photograph as every view",
-        f"{LEAST_GAIN:g} dB or more",
-        gain,
-        "dB",
-        gain >= LEAST_GAIN,
-        f"{measured.decibels('sparse'):.1f} dB against {measured.decibels('repeated'):.1f} dB: with principal "
-        "components as atoms; the paper learns its dictionary for sparse coding",
+        measured.decibels("sparse"),
+        measured.decibels("repeated"),
+        LEAST_GAIN,
+        "with principal components as atoms; the paper learns its dictionary for sparse coding",
     )
 
 
 def _pictures(measured: Measured) -> tuple[tuple[Picture, ...], ...]:
     truth, images = measured.scene.truth, measured.images
     third = tuple(slice(n // 3, 2 * n // 3) for n in truth.shape[2:])
-    recordings = figures.new_figure(9.0, 3.3)
     first: list[tuple[str, figures.Shown]] = [
         ("without the mask", figures.grey_shown(images["open"])),
         ("through the mask, × 2", figures.grey_shown(2 * images["coded"])),
         ("a part of it", figures.grey_shown(2 * images["coded"][third])),
     ]
-    figures.fill(recordings.subplots(1, 3, squeeze=False), [first], cmap="gray", vmin=0, vmax=1)
     corner = (0, 0)
     named = (
         ("mask", "coded"),
@@ -490,32 +446,29 @@ def _pictures(measured: Measured) -> tuple[tuple[Picture, ...], ...]:
         (f"{words}: {measured.decibels(name):.1f} dB", figures.grey_shown(measured.views[name][corner]))
         for words, name in named
     ]
-    views = figures.new_figure(9.0, 6.4)
-    figures.fill(views.subplots(2, 3, squeeze=False), [every[:3], every[3:]], cmap="gray", vmin=0, vmax=1)
     row = truth.shape[2] // 2
     slices = [("truth", truth), *((words, measured.views[name]) for words, name in named[:3])]
     lines = [
         [(words, figures.grey_shown(np.repeat(each[VIEWS // 2, :, row], 4, axis=0)))] for words, each in slices
     ]
-    across = figures.new_figure(9.0, 4.6)
-    figures.fill(across.subplots(len(lines), 1, squeeze=False), lines, cmap="gray", vmin=0, vmax=1)
-    return (
-        (
-            Picture(
-                "recordings",
-                "The recordings",
-                "One exposure each, in the same time. Each pixel sees the lens through its own code.",
-                recordings,
-            ),
+    return below(
+        Picture(
+            "recordings",
+            "The recordings",
+            "One exposure each, in the same time. Each pixel sees the lens through its own code.",
+            figures.table((9.0, 3.3), [first]),
         ),
-        (Picture("views", "The view from a corner of the lens", "PSNR is over all views.", views),),
-        (
-            Picture(
-                "slices",
-                f"Row {row} of the middle row of views",
-                f"{VIEWS} views, from top to bottom: what is out of focus moves from view to view.",
-                across,
-            ),
+        Picture(
+            "views",
+            "The view from a corner of the lens",
+            "PSNR is over all views.",
+            figures.table((9.0, 6.4), [every[:3], every[3:]]),
+        ),
+        Picture(
+            "slices",
+            f"Row {row} of the middle row of views",
+            f"{VIEWS} views, from top to bottom: what is out of focus moves from view to view.",
+            figures.table((9.0, 4.6), lines),
         ),
     )
 

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 
-from vcc.base.affine import Affine
-from vcc.base.errors import ResultWarning
+from vcc.base.errors import without_result_warnings
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
-from vcc.light_field import LightField
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, below, prose
+from vcc.gallery.flat_target import flat
 from vcc.optics.sensor import Sensor
 from vcc.plot import plot_phase_space_stages
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
 from vcc.showcase.scene import CHECK_PLACES, PLACES
-from vcc.showcase.words import away, length, paragraphs
+from vcc.showcase.words import away, length
 
 POINT_VIEWS = 60
 """Views a side of the light field of a point: a disc of so many cells has its second moment within 0.1 %."""
@@ -39,7 +37,7 @@ def run(bench: Bench, progress: Progress) -> Result:
     points = figures.points_figure(bench.conventional(math.inf), bench.diameter)
     row = round(0.46 * bench.light_field.shape[2])
     scene = plot_phase_space_stages(bench.conventional(bench.far), bench.light_field, pixel_row=row)
-    stages = (
+    stages = below(
         Picture(
             "phase-space-points",
             "Phase space of points",
@@ -49,8 +47,8 @@ def run(bench: Bench, progress: Progress) -> Result:
         Picture("phase-space-scene", "Phase space of the scene", "One row of pixels, focused far.", scene),
     )
     numbers = (*_in_focus(bench, list(taken.values())), *_blurs(bench))
-    text = paragraphs("gallery/prose/conventional.txt", bench=bench)
-    return Result(text, (tuple(pictures), *((stage,) for stage in stages)), numbers, bench.assumed)
+    text = prose(__name__, bench=bench)
+    return Result(text, (tuple(pictures), *stages), numbers, bench.assumed)
 
 
 def _in_focus(bench: Bench, taken: list[figures.Shown]) -> list[Finding]:
@@ -78,10 +76,10 @@ def _blurs(bench: Bench) -> list[Finding]:
         expected = bench.diameter * distance_to_sensor * abs(defocus) / 4
         pixels = 2 * math.ceil(2.3 * expected / POINT_PITCH) + 9
         camera = Camera([bench.lens], Sensor(distance_to_sensor, (pixels, pixels), POINT_PITCH))
-        with warnings.catch_warnings():
+        with without_result_warnings():
             # The light field contains only the point: most of the sensor lies outside it, as intended.
-            warnings.simplefilter("ignore", ResultWarning)
-            image = camera.capture(_point(distance, bench.diameter), between_views="none").to_numpy()
+            point = flat(np.ones((1, 1)), bench.diameter / POINT_VIEWS, POINT_PITCH / 0.05, distance, POINT_VIEWS)
+            image = camera.capture(point, between_views="none").to_numpy()
         x = camera.sensor.column_places
         across = image.sum(axis=0, dtype=np.float64)
         # The variances of a pixel and of the point's own width add.
@@ -97,16 +95,6 @@ def _blurs(bench: Bench) -> list[Finding]:
             )
         )
     return found
-
-
-def _point(distance: float, width: float) -> LightField:
-    """A point of light on the axis: one pixel per view, and all views converge on it."""
-    spacing = width / POINT_VIEWS
-    values = np.ones((POINT_VIEWS, POINT_VIEWS, 1, 1), np.float32)
-    middle = (POINT_VIEWS - 1) / 2
-    matrix = np.diag([spacing, spacing, -POINT_PITCH / 0.05, -POINT_PITCH / 0.05, 1.0])
-    matrix[2, 0] = matrix[3, 1] = spacing / distance
-    return LightField(values, Affine(matrix) @ Affine.translation(-middle, -middle, 0, 0))
 
 
 ENTRY = Entry(

@@ -5,24 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcc.base.cached import cached
 from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, FULL, NOISE, PUPIL, WAVELENGTH, Comparison, Measured, Seen, Sizes
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, prose
+from vcc.gallery.extended_depth import FULL, PUPIL, WAVELENGTH, Comparison, Measured, Seen, Sizes, Study
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 
@@ -139,104 +135,41 @@ class Run:
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Record a light field with the three cameras, and measure."""
         kinds = designed(bench, self.sizes)
-        comparison, depths = kinds.comparison, kinds.comparison.depths
-        advance = Steps(progress, 3 * len(depths) + 2)
-        progress(0, advance.total)
-        cameras = {"no diffuser": kinds.plain, "random-phase": kinds.random, "radial": kinds.radial}
-        found = {words: comparison.measured(elements, kinds.plain, advance) for words, elements in cameras.items()}
-        scene = extended_depth.scene_pictures(
-            Seen("plain", "No diffuser", comparison, kinds.plain),
-            Seen("coded", "Radial diffuser", comparison, kinds.radial),
-            found["radial"].spreads,
-            advance,
-        )
-        pictures = (*((picture,) for picture in _figures(found, depths)), scene)
-        return Result(_text(kinds), pictures, tuple(_findings(found, depths)), bench.assumed)
-
-
-def _figures(found: dict[str, Measured], depths: tuple[float, ...]) -> tuple[Picture, ...]:
-    return (
-        Picture(
-            "psf",
-            "Point-spread functions",
-            "From near to far, rays traced; brightness is the square root of light, each PSF by its own peak.",
-            extended_depth.spreads_figure(found, depths),
-        ),
-        Picture(
-            "target",
-            "A flat target near, in focus and far",
-            "Restored by one filter for each camera; in focus without a diffuser no filter is needed.",
-            extended_depth.target_figure(found, depths),
-        ),
-        Picture(
+        cameras = {
+            "no diffuser": kinds.plain,
+            "random-phase diffuser": kinds.random,
+            "radial diffuser": kinds.radial,
+        }
+        study = Study.of([Seen(words, kinds.comparison, each) for words, each in cameras.items()], progress)
+        contrast_picture = Picture(
             "contrast",
             "Contrast",
             "Modulation transfer along a row: in focus (full lines) and at the near end (dashed).",
-            _contrast_figure(found, depths[0]),
-        ),
-    )
+            _contrast_figure(study.found, study.depths[0]),
+        )
+        pictures = (*study.pictures(), (contrast_picture,), study.scene)
+        return Result(_text(kinds), pictures, tuple(_findings(study)), bench.assumed)
 
 
 def _text(kinds: Kinds) -> str:
     narrowest = PUPIL / 2 * (1 - math.sqrt(1 - 1 / RINGS))
-    return paragraphs(
-        "gallery/prose/diffuser-depth-of-field.txt",
-        comparison=kinds.comparison,
-        strongest=kinds.strongest,
-        pupil=PUPIL,
-        rings=RINGS,
-        margin=MARGIN,
-        noise=NOISE,
-        narrowest=narrowest,
-        spread=WAVELENGTH * kinds.comparison.sensor((1, 1)).z / narrowest,
+    spread = WAVELENGTH * kinds.comparison.sensor((1, 1)).z / narrowest
+    return prose(__name__, extended_depth=extended_depth, kinds=kinds, narrowest=narrowest, spread=spread)
+
+
+def _findings(study: Study) -> Iterator[Finding]:
+    yield from study.findings(LEAST_GAIN, "the peak in the middle stays; what lies around it changes with depth")
+    middle = len(study.depths) // 2
+    without, *others = (
+        (words, float(contrast(each.spreads[middle], FREQUENCY))) for words, each in study.found.items()
     )
-
-
-def _findings(found: dict[str, Measured], depths: tuple[float, ...]) -> Iterator[Finding]:
-    plain = found["no diffuser"]
-    yield Finding(
-        "PSF alike over depth, no diffuser: lowest correlation",
-        f"not alike: below {ALIKE}",
-        plain.alike,
-        reached=plain.alike < ALIKE,
-    )
-    for words in ("random-phase", "radial"):
-        yield from _findings_of(words, found[words], plain, depths)
-
-
-def _findings_of(words: str, coded: Measured, plain: Measured, depths: tuple[float, ...]) -> Iterator[Finding]:
-    yield Finding(
-        f"PSF alike over depth, {words}: lowest correlation",
-        f"alike: {ALIKE} or more",
-        coded.alike,
-        reached=coded.alike >= ALIKE,
-        why="the peak in the middle stays; what lies around it changes with depth",
-    )
-    for end in (0, -1):
-        gain = coded.decibels[end] - plain.decibels[end]
+    for words, found in others:
         yield Finding(
-            f"flat target {away(depths[end])}, {words}, one filter for all depths: gain",
-            f"{LEAST_GAIN:g} dB or more",
-            gain,
-            "dB",
-            gain >= LEAST_GAIN,
-            f"{coded.decibels[end]:.1f} dB against {plain.decibels[end]:.1f} dB",
+            f"contrast in focus at {FREQUENCY:g} cycles per pixel that is left, {words}",
+            "",
+            found / without[1],
+            why="what is spread around the peak veils the picture",
         )
-    middle = len(depths) // 2
-    kept = float(contrast(coded.spreads[middle], FREQUENCY)) / float(contrast(plain.spreads[middle], FREQUENCY))
-    yield Finding(
-        f"contrast in focus at {FREQUENCY:g} cycles per pixel that is left, {words}",
-        "",
-        kept,
-        why="what is spread around the peak veils the picture",
-    )
-    yield Finding(
-        f"what the diffuser costs in focus, {words}",
-        "",
-        plain.decibels[middle] - coded.decibels[middle],
-        "dB",
-        why="the filter that gives contrast back amplifies noise",
-    )
 
 
 def contrast(spread: Array, frequency: ArrayLike) -> Array:
@@ -246,7 +179,7 @@ def contrast(spread: Array, frequency: ArrayLike) -> Array:
     return np.asarray(np.abs(wave @ spread.sum(axis=0)))
 
 
-def _contrast_figure(found: dict[str, Measured], nearest: float) -> Figure:
+def _contrast_figure(found: dict[str, Measured], nearest: float) -> figures.Figure:
     figure = figures.new_figure(7.5, 3.6)
     axes = figure.subplots()
     frequency = np.linspace(0, 0.5, 101)
@@ -254,8 +187,7 @@ def _contrast_figure(found: dict[str, Measured], nearest: float) -> Figure:
         middle = len(each.spreads) // 2
         axes.plot(frequency, contrast(each.spreads[middle], frequency), color=colour, label=words)
         axes.plot(frequency, contrast(each.spreads[0], frequency), color=colour, linestyle="--")
-    axes.set_xlabel("frequency [cycles per pixel]", fontsize=figures.LABEL)
-    axes.set_ylabel("contrast left", fontsize=figures.LABEL)
+    figures.label(axes, "frequency [cycles per pixel]", "contrast left")
     axes.set_xlim(0, 0.5)
     axes.set_ylim(0, 1.02)
     for words, style in (("in focus", "-"), (away(nearest), "--")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,9 @@ from vcc.base.measures import psnr
 from vcc.base.units import mm, nm, um
 from vcc.camera import Camera
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.gallery.total_variation import CroppedBlur
 from vcc.image import Image
-from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.optics.electronics import Electronics
 from vcc.optics.faces import Element
@@ -30,10 +29,6 @@ from vcc.shapes.height_maps import Rough
 from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Kind = Literal["dense", "sparse"]
@@ -147,10 +142,7 @@ class Laboratory:
 
     def captured(self, device: Device, target: Array) -> Image:
         """The irradiance of a target on black."""
-        wide = np.pad(target, MARGIN).astype(np.float32)
-        # For a flat object, all views are the same image if they converge on it.
-        views = np.ascontiguousarray(np.broadcast_to(wide, (2, 2, *wide.shape)))
-        field = LightField.from_views(views, OPENING, PITCH / TO_SENSOR, DISTANCE, disparity_range=(0.0, 0.0))
+        field = flat_target.flat(np.pad(target, MARGIN), OPENING, PITCH / TO_SENSOR, DISTANCE)
         camera = Camera(device.elements, self.sensor)
         return camera.capture(field, method="rays", interpolation="linear", samples=self.samples)
 
@@ -287,7 +279,7 @@ class Run(Laboratory):
         found["far", "dense"] = self._recovered(diffused.recording, farther, diffused.weight, target)
         advance()
         measured = Measured(targets, kernels["diffuser"], found, error, widths)
-        return Result(_text(self), _pictures(measured), tuple(_findings(measured)), bench.assumed)
+        return Result(prose(__name__, run=self), _pictures(measured), tuple(_findings(measured)), bench.assumed)
 
     def _recovered(self, recording: Array, blur: CroppedBlur, weight: float, target: Array) -> Recovered:
         made = blur.recovered(recording, weight, self.steps)
@@ -312,22 +304,6 @@ def _view(bench: Bench, side: int) -> Array:
     return np.asarray(square.reshape(side, every, side, every).mean(axis=(1, 3)))
 
 
-def _text(run: Run) -> str:
-    return paragraphs(
-        "gallery/prose/diffusercam.txt",
-        run=run,
-        pitch=PITCH,
-        to_sensor=TO_SENSOR,
-        opening=OPENING,
-        distance=DISTANCE,
-        correlation=CORRELATION,
-        slope=SLOPE_RMS,
-        electronics=ELECTRONICS,
-        pinholes=PINHOLES,
-        spread=WAVELENGTH * TO_SENSOR / (2 * CORRELATION),
-    )
-
-
 def _findings(measured: Measured) -> Iterator[Finding]:
     difference, sampling = measured.error
     photons = 1 / math.sqrt(ELECTRONICS.full_well)
@@ -340,28 +316,18 @@ def _findings(measured: Measured) -> Iterator[Finding]:
         difference < photons,
         f"the sampling error of the rays is estimated as {sampling:.2%}",
     )
-    for kind in measured.targets:
-        yield _gain(
-            measured, "open", kind, "the same opening without a diffuser", "same pixels, light and decoder"
-        )
-    yield _gain(
-        measured, "no crop", "dense", "a model without the crop", "it takes light beyond the sensor as dark"
+    pinhole = f"the best pinhole, {measured.widths['sparse']} pixels wide"
+    without = "the same opening without a diffuser"
+    rivals: tuple[tuple[Kind, str, str, float, str], ...] = (
+        ("dense", "open", without, LEAST_GAIN, "same pixels, light and decoder"),
+        ("sparse", "open", without, LEAST_GAIN, "same pixels, light and decoder"),
+        ("dense", "no crop", "a model without the crop", LEAST_GAIN, "it takes light beyond the sensor as dark"),
+        ("dense", "far", "the PSF of a point at infinity", 0.0, "same weight; a PSF scales with distance"),
+        ("sparse", "pinhole", pinhole, LEAST_GAIN, "same pixels and exposure time, less light"),
     )
-    yield _gain(
-        measured,
-        "far",
-        "dense",
-        "the PSF of a point at infinity",
-        "same weight; a PSF scales with distance",
-        least=0.0,
-    )
-    yield _gain(
-        measured,
-        "pinhole",
-        "sparse",
-        f"the best pinhole, {measured.widths['sparse']} pixels wide",
-        "same pixels and exposure time, less light",
-    )
+    for kind, over, words, least, why in rivals:
+        mine, its = (measured.found[name, kind].decibels for name in ("diffuser", over))
+        yield Finding.gain(f"{kind} target: gain over {words}", mine, its, least, why)
     width = measured.widths["dense"]
     yield Finding(
         f"dense target: gain over the best pinhole, {width} pixels wide, in the same time",
@@ -381,58 +347,40 @@ def _findings(measured: Measured) -> Iterator[Finding]:
         )
 
 
-def _gain(measured: Measured, over: str, kind: Kind, words: str, why: str, least: float = LEAST_GAIN) -> Finding:
-    gain = measured.gain(over, kind)
-    return Finding(
-        f"{kind} target: gain over {words}",
-        f"{least:g} dB or more" if least else "better",
-        gain,
-        "dB",
-        gain >= least,
-        f"{measured.against(over, kind)}: {why}",
-    )
-
-
 def _pictures(measured: Measured) -> tuple[tuple[Picture, ...], ...]:
     found = measured.found
     shown: tuple[tuple[Kind, tuple[str, ...]], ...] = (
         ("dense", ("diffuser", "no crop", "open", "pinhole", "lens")),
         ("sparse", ("diffuser", "open", "pinhole", "lens")),
     )
-    psf = figures.new_figure(9.0, 3.2)
     kernel = measured.kernel / measured.kernel.max()
     first = [
         ("PSF", figures.grey_shown(np.pad(kernel, max(0, (len(measured.targets["dense"]) - len(kernel)) // 2)))),
         ("recording, dense", _stretched(found["diffuser", "dense"].recording)),
         ("recording, sparse", _stretched(found["diffuser", "sparse"].recording)),
     ]
-    figures.fill(psf.subplots(1, 3, squeeze=False), [first], cmap="gray", vmin=0, vmax=1)
-    return (
-        (
-            Picture(
-                "recordings",
-                "The image of a point, and two recordings",
-                "The diffuser focuses light into caustics. The PSF has the scale of the recordings, which are "
-                "stretched from their darkest to their brightest pixel.",
-                psf,
-            ),
+    return below(
+        Picture(
+            "recordings",
+            "The image of a point, and two recordings",
+            "The diffuser focuses light into caustics. The PSF has the scale of the recordings, which are "
+            "stretched from their darkest to their brightest pixel.",
+            figures.table((9.0, 3.2), [first]),
         ),
         *(
-            (
-                Picture(
-                    kind,
-                    f"The {kind} target",
-                    "Recovered from recordings with noise, by one decoder. All devices have the same pixels and "
-                    "exposure time, all but the pinhole the same light.",
-                    _row(measured, kind, names),
-                ),
+            Picture(
+                kind,
+                f"The {kind} target",
+                "Recovered from recordings with noise, by one decoder. All devices have the same pixels and "
+                "exposure time, all but the pinhole the same light.",
+                _row(measured, kind, names),
             )
             for kind, names in shown
         ),
     )
 
 
-def _row(measured: Measured, kind: Kind, names: Sequence[str]) -> Figure:
+def _row(measured: Measured, kind: Kind, names: Sequence[str]) -> figures.Figure:
     words = {
         "open": "no diffuser",
         "no crop": "diffuser, no crop",
@@ -444,12 +392,8 @@ def _row(measured: Measured, kind: Kind, names: Sequence[str]) -> Figure:
         every.append(
             (f"{words.get(name, name)}: {one.decibels:.1f} dB", figures.grey_shown(np.clip(one.target, 0, 1)))
         )
-    if len(every) % 3:
-        every += [("", np.ones_like(every[0][1]))] * (3 - len(every) % 3)
     rows = [every[start : start + 3] for start in range(0, len(every), 3)]
-    figure = figures.new_figure(9.0, 3.2 * len(rows))
-    figures.fill(figure.subplots(len(rows), 3, squeeze=False), rows, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((9.0, 3.2 * len(rows)), rows)
 
 
 def _stretched(recording: Array) -> figures.Shown:

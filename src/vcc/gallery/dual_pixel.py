@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import PointSpread, psf
-from vcc.base.affine import Affine
-from vcc.base.errors import ResultWarning
+from vcc.base.errors import without_result_warnings
 from vcc.base.units import um
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
+from vcc.gallery.flat_target import flat
 from vcc.image import Image, PhotodiodeImage
-from vcc.light_field import LightField
 from vcc.optics.electronics import Electronics
 from vcc.optics.pixels import Microlens
 from vcc.optics.sensor import Sensor
@@ -26,10 +23,7 @@ from vcc.recording import expose_image
 from vcc.recover import PhotodiodeDepth, PhotodiodeDisparity, depth_by_photodiodes
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -104,15 +98,12 @@ class Run:
         numbers = [_sum_finding(image, whole), *_line_findings(bench, points), *_mirror_findings(spreads)]
         for words, each in found.items():
             numbers += _depth_findings(bench, words, each, truth, self.block)
-        text = paragraphs(
-            "gallery/prose/dual-pixel.txt", bench=bench, camera=camera, microlens=MICROLENS, block=self.block
-        )
+        text = prose(__name__, bench=bench, camera=camera, block=self.block)
         return Result(text, _pictures(bench, image, spreads, points, found, truth), tuple(numbers), bench.assumed)
 
     def _found(self, bench: Bench, camera: Camera, image: Image) -> Found:
         nearest = min(bench.near, *bench.scene.distances) if bench.scene else bench.near
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResultWarning)  # blocks without texture: they are left grey
+        with without_result_warnings():  # blocks without texture: they are left grey
             depth = depth_by_photodiodes(
                 image, camera, (0.7 * nearest, math.inf), block=self.block, step=self.step
             )
@@ -150,24 +141,15 @@ def _disparities(bench: Bench) -> Array:
         sensor = Sensor(
             z, (pixels, pixels), POINT_PITCH, photodiodes=(1, 2), microlens=Microlens(f_number=MICROLENS)
         )
-        with warnings.catch_warnings():
+        point = flat(np.ones((1, 1)), bench.diameter / POINT_VIEWS, POINT_PITCH / 0.05, 1 / vergence, POINT_VIEWS)
+        with without_result_warnings():
             # The light field holds only the point: most of the sensor's rays are missing.
-            warnings.simplefilter("ignore", ResultWarning)
-            image = Camera([bench.lens], sensor).capture(_point(vergence, bench.diameter), between_views="none")
+            image = Camera([bench.lens], sensor).capture(point, between_views="none")
         assert isinstance(image, PhotodiodeImage)
         light = [each.to_numpy().sum(axis=0, dtype=np.float64) for each in image.photodiodes[0]]
         left, right = (float(each @ sensor.column_places / each.sum()) for each in light)
         found.append(left - right)
     return np.array(found)
-
-
-def _point(vergence: float, width: float) -> LightField:
-    """A point of light on the axis: one pixel a view, all of which look at it."""
-    spacing, middle = width / POINT_VIEWS, (POINT_VIEWS - 1) / 2
-    matrix = np.diag([spacing, spacing, -POINT_PITCH / 0.05, -POINT_PITCH / 0.05, 1.0])
-    matrix[2, 0] = matrix[3, 1] = spacing * vergence
-    frame = Affine(matrix) @ Affine.translation(-middle, -middle, 0, 0)
-    return LightField(np.ones((POINT_VIEWS, POINT_VIEWS, 1, 1), np.float32), frame)
 
 
 def _spreads(bench: Bench) -> dict[tuple[str, str], PointSpread]:
@@ -320,15 +302,13 @@ def _pictures(
                 difference,
             ),
         ),
-        (
+        *below(
             Picture(
                 "points",
                 "Points",
                 "As light lands: half discs, which change sides at the focus, and the disparity of centroids.",
                 _point_figure(bench, spreads, points),
             ),
-        ),
-        (
             Picture(
                 "depth",
                 "Distance from disparity",
@@ -339,14 +319,14 @@ def _pictures(
     )
 
 
-def _point_figure(bench: Bench, spreads: dict[tuple[str, str], PointSpread], points: Array) -> Figure:
+def _point_figure(bench: Bench, spreads: dict[tuple[str, str], PointSpread], points: Array) -> figures.Figure:
     figure = figures.new_figure(8.4, 3.6)
     grid = figure.add_gridspec(2, 4, width_ratios=(1, 1, 0.12, 2.4))
     for row, place in enumerate(_PLACES):
         for column, name in enumerate(("left", "right")):
             values = spreads[place, name].values.astype(np.float32)
             axes = figure.add_subplot(grid[row, column])
-            figures.put(axes, values / values.max(), f"{name} photodiode" if row == 0 else "", cmap="gray")
+            figures.put(axes, values / values.max(), f"{name} photodiode" if row == 0 else "")
             if column == 0:
                 axes.set_ylabel(
                     place.replace(" the focus", "\nthe focus"), fontsize=figures.LABEL, color=figures.INK
@@ -357,14 +337,12 @@ def _point_figure(bench: Bench, spreads: dict[tuple[str, str], PointSpread], poi
     axes.plot(vergences, line / um, color=figures.INK, linewidth=1, label="8R/(3π) · d · (1/Z − 1/F)")
     axes.plot(vergences, points / um, "o", color=figures.ACCENT, markersize=5, label="captured points")
     axes.axhline(0, color=figures.QUIET, linewidth=0.6)
-    axes.set_xlabel("1/Z [1/m]", fontsize=figures.LABEL)
-    axes.set_ylabel("disparity, left − right [µm]", fontsize=figures.LABEL)
-    axes.tick_params(labelsize=figures.LABEL)
+    figures.label(axes, "1/Z [1/m]", "disparity, left − right [µm]")
     axes.legend(fontsize=figures.LABEL, frameon=False)
     return figure
 
 
-def _depth_figure(bench: Bench, found: dict[str, Found], truth: Array | None) -> Figure:
+def _depth_figure(bench: Bench, found: dict[str, Found], truth: Array | None) -> figures.Figure:
     maps = []
     if bench.scene is not None and truth is not None:
         nearest = 1 / np.array(bench.scene.distances)[truth.argmax(axis=0)]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vcc.base import showing
 from vcc.base.describe import Brief
@@ -14,6 +15,7 @@ from vcc.base.progress import Progress as Progress
 from vcc.light_field import LightField
 from vcc.showcase.bench import Bench, built_in, from_someone
 from vcc.showcase.figures import Shown
+from vcc.showcase.words import paragraphs
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -56,6 +58,11 @@ class Picture:
     content: Shown | Figure
 
 
+def below(*pictures: Picture) -> tuple[tuple[Picture, ...], ...]:
+    """Pictures one below the other: each is a row of a `Result`."""
+    return tuple((picture,) for picture in pictures)
+
+
 @dataclass(frozen=True)
 class Finding:
     """One measured number, with the claim about it.
@@ -75,6 +82,28 @@ class Finding:
     unit: str = ""
     reached: bool | None = None
     why: str = ""
+
+    @classmethod
+    def gain(cls, what: str, ours: float, theirs: float, least: float, why: str = "", claim: str = "") -> Finding:
+        """The claim that one result is better than another by some decibels, or just better for 0.
+
+        Args:
+            what: name of the measurement.
+            ours: decibels of the one.
+            theirs: decibels of the other.
+            least: decibels to gain.
+            why: an explanation.
+            claim: words of the claim before the number.
+        """
+        least_words = f"{least:g} dB or more" if least else "better"
+        return cls(
+            what,
+            f"{claim}: {least_words}" if claim else least_words,
+            ours - theirs,
+            "dB",
+            ours - theirs >= least,
+            f"{ours:.1f} dB against {theirs:.1f} dB" + (f": {why}" if why else ""),
+        )
 
     @property
     def verdict(self) -> str:
@@ -152,6 +181,18 @@ def bench_for(light_field: Path | LightField | None) -> Bench:
 @lru_cache(maxsize=1)
 def _scene() -> Bench:
     return built_in(small=False)
+
+
+def prose(module: str, **values: Any) -> str:
+    """The paragraphs ``gallery/prose/NAME.txt`` of an entry, as HTML.
+
+    Args:
+        module: name of the entry's module, ``__name__``; the template has all of its constants.
+        values: further values for the template.
+    """
+    constants = {name: value for name, value in vars(sys.modules[module]).items() if name.isupper()}
+    name = module.rpartition(".")[2].replace("_", "-")
+    return paragraphs(f"gallery/prose/{name}.txt", **constants, **values)
 
 
 def silent(done: int, total: int) -> None:

@@ -7,9 +7,8 @@ restoration by one filter for all depths, and the cost in focus.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from vcc.base.errors import InputError
 from vcc.base.units import mm, nm
 from vcc.camera import Camera
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Picture
+from vcc.gallery.entry import Finding, Picture, Progress, Steps, below
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PhasePlate
 from vcc.optics.sensor import Sensor
@@ -28,9 +27,6 @@ from vcc.recover import wiener
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
 from vcc.showcase.words import away
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Elements = Sequence[Lens | PhasePlate | Mask]
@@ -166,21 +162,15 @@ class Comparison:
         counts = np.stack([np.histogram2d(each[:, 1], each[:, 0], bins=(edges, edges))[0] for each in landed])
         return np.asarray(counts[:, ::-1, ::-1] / counts.sum(axis=(1, 2), keepdims=True))
 
-    def target(self) -> Array:
-        """A flat target: the middle of the middle view, grey, 0 to 1; see `vcc.gallery.flat_target.grey_view`."""
-        return flat_target.grey_view(self.bench, self.sizes.target)
-
     def recorded(self, elements: Elements, depth: float, noise: float = NOISE) -> tuple[Array, float]:
         """The flat target at a depth, through a camera; upright, white 1, with noise; and the noise level.
 
         The target is mirrored beyond its border, so that the recording has no dark border.
         """
-        flat = self.target()
+        flat = flat_target.grey_view(self.bench, self.sizes.target)
         margin = min(64, *(side - 1 for side in flat.shape))
-        wide = np.pad(flat, margin, mode="symmetric").astype(np.float32)
-        # For a flat object, all views are the same picture if they converge on it.
-        views = np.ascontiguousarray(np.broadcast_to(wide, (2, 2, *wide.shape)))
-        field = LightField.from_views(views, PUPIL, self.slope, depth, disparity_range=(0.0, 0.0))
+        wide = np.pad(flat, margin, mode="symmetric")
+        field = flat_target.flat(wide, PUPIL, self.slope, depth)
         return self.photographed(elements, field, (flat.shape[0], flat.shape[1]), noise)
 
     def photographed(
@@ -197,36 +187,22 @@ class Comparison:
         noisy = values + noise * np.random.default_rng(0).standard_normal(values.shape)
         return noisy, math.hypot(noise, image.sampling_error * scale)
 
-    def measured(self, elements: Elements, plain: Elements, advance: Callable[[], None]) -> Measured:
-        """The PSFs of a camera, and the flat target restored by one Wiener filter for all depths.
-
-        Args:
-            elements: of the camera.
-            plain: elements of the reference; its noiseless image in focus is the truth. If it is the camera
-                itself, the recording is kept if it is better than the filtered one.
-            advance: called after each depth.
-        """
-        sharp, _ = self.recorded(plain, self.focus, noise=0)
-        return self.restored(elements, sharp, advance, or_as_recorded=elements is plain)
-
     def restored(
-        self, elements: Elements, sharp: Array, advance: Callable[[], None], or_as_recorded: bool = False
+        self, elements: Elements, sharp: Array, advance: Callable[[], None], unfiltered: bool
     ) -> Measured:
-        """The same with a given truth.
+        """The PSFs of a camera, and the flat target restored by one Wiener filter for all depths.
 
         Args:
             elements: of the camera.
             sharp: the truth.
             advance: called after each depth.
-            or_as_recorded: whether the recording is kept if it is better than the filtered one.
+            unfiltered: whether the recording itself counts where it is better than the filtered one.
         """
         spreads = self.spreads(elements)
         restored, decibels = [], []
         for depth in self.depths:
             taken, noise = self.recorded(elements, depth)
-            candidates = [wiener(taken, spreads, noise).picture]
-            if or_as_recorded:
-                candidates.append(taken)
+            candidates = [wiener(taken, spreads, noise).picture, *([taken] if unfiltered else [])]
             best = max(candidates, key=lambda each: psnr(each, sharp))
             restored.append(best)
             decibels.append(psnr(best, sharp))
@@ -245,7 +221,7 @@ def inner(picture: Array, border: float, whole: Callable[[float], int] = round) 
     return picture[rows : picture.shape[0] - rows, columns : picture.shape[1] - columns]
 
 
-def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
+def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> figures.Figure:
     """PSFs side by side over depth, a row per camera.
 
     Args:
@@ -253,8 +229,6 @@ def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fi
         depths: metres.
     """
     side = min(max(each.spreads.shape[1] for each in found.values()), 61)
-    figure = figures.new_figure(1.5 * len(depths), 1.6 * len(found) + 0.2)
-    grid = figure.subplots(len(found), len(depths), squeeze=False)
     rows = [
         [
             (away(depth) if row == 0 else "", _middle(np.sqrt(spread / spread.max()), side))
@@ -262,8 +236,7 @@ def spreads_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fi
         ]
         for row, each in enumerate(found.values())
     ]
-    figures.fill(grid, rows, list(found), cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((1.5 * len(depths), 1.6 * len(found) + 0.2), rows, list(found))
 
 
 def _middle(picture: Array, side: int) -> figures.Shown:
@@ -273,9 +246,8 @@ def _middle(picture: Array, side: int) -> figures.Shown:
     return wide[cut : cut + side, cut : cut + side]
 
 
-def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Figure:
+def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> figures.Figure:
     """The flat target restored near, in focus and far, a row per camera."""
-    figure = figures.new_figure(9.0, 3.2 * len(found))
     rows = [
         [
             (
@@ -286,36 +258,102 @@ def target_figure(found: Mapping[str, Measured], depths: Sequence[float]) -> Fig
         ]
         for words, each in found.items()
     ]
-    figures.fill(figure.subplots(len(found), 3, squeeze=False), rows, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((9.0, 3.2 * len(found)), rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A camera that records the scene.
+    """A camera of a study.
 
     Args:
-        name: of the pictures' files.
-        words: title.
+        words: its name in findings and pictures.
         comparison: its settings.
         elements: of the camera.
     """
 
-    name: str
     words: str
     comparison: Comparison
     elements: Elements
 
 
-def scene_pictures(plain: Seen, coded: Seen, spreads: Array, advance: Callable[[], None]) -> tuple[Picture, ...]:
-    """The light field through both cameras, and the coded recording restored by the one filter.
+@dataclass(frozen=True, eq=False)
+class Study:
+    """Cameras side by side; the first one lacks the element that the others have.
 
     Args:
-        plain: the camera without an element.
-        coded: the one with it.
-        spreads: PSFs of the coded camera.
-        advance: called after each picture.
+        depths: metres, nearest first.
+        found: by the words of the cameras.
+        scene: pictures of the scene through the first and the last camera.
     """
+
+    depths: tuple[float, ...]
+    found: dict[str, Measured]
+    scene: tuple[Picture, ...]
+
+    @classmethod
+    def of(cls, cameras: Sequence[Seen], progress: Progress) -> Study:
+        """Measure each camera, and record the scene.
+
+        The first camera's image in focus without noise is the truth of the flat target. Its other recordings count
+        without a filter where they are better so.
+        """
+        plain, coded = cameras[0], cameras[-1]
+        depths = plain.comparison.depths
+        advance = Steps(progress, len(cameras) * len(depths) + 2)
+        progress(0, advance.total)
+        sharp, _ = plain.comparison.recorded(plain.elements, plain.comparison.focus, noise=0)
+        found = {
+            each.words: each.comparison.restored(each.elements, sharp, advance, unfiltered=each is plain)
+            for each in cameras
+        }
+        return cls(depths, found, _scene_pictures(plain, coded, found[coded.words].spreads, advance))
+
+    @property
+    def plain(self) -> Measured:
+        """The camera without the element."""
+        return next(iter(self.found.values()))
+
+    def pictures(self) -> tuple[tuple[Picture, ...], ...]:
+        """Rows of pictures: PSFs and restored targets."""
+        return below(
+            Picture(
+                "psf",
+                "Point-spread functions",
+                "From near to far, rays traced; brightness is the square root of light, each PSF by its own peak.",
+                spreads_figure(self.found, self.depths),
+            ),
+            Picture(
+                "target",
+                "A flat target near, in focus and far",
+                "Restored by one filter for each camera; in focus, the camera of the first row needs none.",
+                target_figure(self.found, self.depths),
+            ),
+        )
+
+    def findings(self, least: float, why: str) -> Iterator[Finding]:
+        """How alike the PSFs are, what restored targets gain at both ends of the range, and the cost in focus.
+
+        Args:
+            least: claimed gain, dB.
+            why: explains how alike the PSFs of the cameras with the element are.
+        """
+        plain, (without, *others) = self.plain, self.found
+        alike = "PSF alike over depth, {}: lowest correlation"
+        yield Finding(alike.format(without), f"not alike: below {ALIKE}", plain.alike, "", plain.alike < ALIKE)
+        for words in others:
+            coded, middle = self.found[words], len(self.depths) // 2
+            yield Finding(
+                alike.format(words), f"alike: {ALIKE} or more", coded.alike, "", coded.alike >= ALIKE, why
+            )
+            for end in (0, -1):
+                what = f"flat target {away(self.depths[end])}, {words}, one filter for all depths: gain"
+                yield Finding.gain(what, coded.decibels[end], plain.decibels[end], least, "noise limits")
+            cost = plain.decibels[middle] - coded.decibels[middle]
+            yield Finding(f"cost in focus, {words}", "", cost, "dB", None, "the filter amplifies noise")
+
+
+def _scene_pictures(plain: Seen, coded: Seen, spreads: Array, advance: Callable[[], None]) -> tuple[Picture, ...]:
+    """The light field through both cameras, and the coded recording restored by the one filter."""
     bench = plain.comparison.bench
     field = bench.light_field
     rows, columns = (int(0.94 * n) for n in field.shape[2:4])
@@ -324,12 +362,11 @@ def scene_pictures(plain: Seen, coded: Seen, spreads: Array, advance: Callable[[
     recorded, noise = coded.comparison.photographed(coded.elements, field, (rows, columns))
     advance()
     white = float(np.percentile(without, 99.5)) if bench.scene is None else 1.0
-    whole = {
-        plain.name: (plain.words, without),
-        coded.name: (f"{coded.words}, as recorded", recorded),
-        "restored": ("Restored by the one filter", wiener(recorded, spreads, noise).picture),
-    }
     return tuple(
-        Picture(f"scene-{name}", title, "", figures.values_shown(picture, white))
-        for name, (title, picture) in whole.items()
+        Picture(f"scene-{name}", title.capitalize(), "", figures.values_shown(picture, white))
+        for name, title, picture in (
+            ("plain", plain.words, without),
+            ("coded", f"{coded.words}, as recorded", recorded),
+            ("restored", "restored by the one filter", wiener(recorded, spreads, noise).picture),
+        )
     )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.units import mm
 from vcc.camera import Camera
+from vcc.fields.grid import Sample
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
 from vcc.optics.sensor import Sensor
@@ -29,6 +30,28 @@ VIEWS_PER_PIXEL = 4
 """Views per pixel of blur, along a side: sets the number of rays per pixel."""
 SMALLEST = 64
 """Least side of a target, pixels."""
+
+
+def flat(
+    picture: NDArray[np.floating],
+    spacing: float,
+    slope: float,
+    distance: float,
+    views: int = 2,
+    sample: Sample = "mean",
+) -> LightField:
+    """The light of a flat object: all views are the same picture, without copies, and converge on it.
+
+    Args:
+        picture: radiance, (rows, columns[, channels]).
+        spacing: of the views, metres.
+        slope: from pixel to pixel.
+        distance: of the object, metres.
+        views: each way.
+        sample: see `vcc.LightField`.
+    """
+    values = np.broadcast_to(picture.astype(np.float32), (views, views, *picture.shape))
+    return LightField.from_views(values, spacing, slope, distance, disparity_range=(0.0, 0.0), sample=sample)
 
 
 def grey_view(bench: Bench, most: int) -> Array:
@@ -85,9 +108,7 @@ def kernel(mask: Mask, blur: int) -> Array:
 
 def _through(mask: Mask, wide: Array, shape: tuple[int, ...], blur: int) -> Array:
     views = VIEWS_PER_PIXEL * blur
-    # For a flat object, all views are the same picture if they converge on it: broadcast, without copies.
-    values = np.broadcast_to(wide.astype(np.float32), (views, views, *wide.shape))
-    field = LightField.from_views(values, OPENING / views, _slope(blur), DISTANCE, disparity_range=(0.0, 0.0))
+    field = flat(wide, OPENING / views, _slope(blur), DISTANCE, views)
     camera = focal_camera(mask, (shape[0], shape[1]), blur)
     # With "nearest", each ray of a point contributes all of its light to one pixel.
     image = camera.capture(field, method="footprints", between_views="none", interpolation="nearest")

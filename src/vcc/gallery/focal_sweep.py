@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.camera import Camera
-from vcc.gallery import extended_depth
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
-from vcc.gallery.extended_depth import ALIKE, NOISE, PUPIL, Comparison, Elements, Measured, Seen, Sizes
+from vcc.gallery.entry import Entry, Finding, Progress, Result, prose
+from vcc.gallery.extended_depth import NOISE, PUPIL, Comparison, Elements, Seen, Sizes, Study
 from vcc.light_field import LightField
 from vcc.motion import Lines, MovingCamera
 from vcc.optics import Lens, Mask
 from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Circle
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
 
 Array = NDArray[np.float64]
 
@@ -118,21 +115,20 @@ class Run:
     def __call__(self, bench: Bench, progress: Progress) -> Result:
         """Record a light field with the static and the sweeping camera, and measure."""
         still, swept = designed(bench, self.sizes)
-        depths = still.depths
-        advance = Steps(progress, 2 * len(depths) + 2)
-        progress(0, advance.total)
-        elements = still.elements
-        plain = still.measured(elements, elements, advance)  # same elements: the recording may be kept
-        sharp, _ = still.recorded(elements, still.focus, noise=0)
-        moved = swept.restored(elements, sharp, advance)
-        scene = extended_depth.scene_pictures(
-            Seen("plain", "Sensor at rest", still, elements),
-            Seen("swept", "Sensor sweeping", swept, elements),
-            moved.spreads,
-            advance,
+        cameras = Seen("sensor at rest", still, still.elements), Seen("sensor sweeping", swept, swept.elements)
+        study = Study.of(cameras, progress)
+        why = "the integral over focus is as 1/r in the middle, wherever in the sweep the focus is passed"
+        differ = (
+            Finding(
+                f"how much restored targets differ over depth, {words}", "", float(np.ptp(each.decibels)), "dB"
+            )
+            for words, each in study.found.items()
         )
         return Result(
-            _text(swept), (*_figures(plain, moved, depths), scene), _findings(plain, moved, depths), bench.assumed
+            prose(__name__, swept=swept),
+            (*study.pictures(), study.scene),
+            (*study.findings(LEAST_GAIN, why), *differ),
+            bench.assumed,
         )
 
 
@@ -144,61 +140,6 @@ def designed(bench: Bench, sizes: Sizes = FULL) -> tuple[Sweeping, Sweeping]:
     """
     still = Sweeping(bench, round=True, sizes=sizes)
     return still, replace(still, travel=2 * MARGIN * still.reach * bench.focal_length**2)
-
-
-def _text(swept: Sweeping) -> str:
-    return paragraphs(
-        "gallery/prose/focal-sweep.txt",
-        swept=swept,
-        pupil=PUPIL,
-        exposure=EXPOSURE,
-        margin=MARGIN,
-        noise=NOISE,
-        tolerance=TIME_TOLERANCE,
-    )
-
-
-def _figures(plain: Measured, moved: Measured, depths: Sequence[float]) -> tuple[tuple[Picture, ...], ...]:
-    spreads = extended_depth.spreads_figure({"at rest": plain, "sweeping": moved}, depths)
-    target = extended_depth.target_figure({"at rest": plain, "sweeping, one filter": moved}, depths)
-    traced = "From near to far, rays traced; above at rest, below over the sweep. Square root of the light."
-    return (
-        (Picture("psf", "Point-spread functions", traced, spreads),),
-        (Picture("target", "A flat target near, in focus and far", "Restored by one filter each.", target),),
-    )
-
-
-def _findings(plain: Measured, moved: Measured, depths: Sequence[float]) -> tuple[Finding, ...]:
-    numbers = [
-        Finding(
-            "PSF over all depths against the middle one, sweeping: lowest correlation",
-            f"nearly the same at all depths: {ALIKE} or more",
-            moved.alike,
-            "",
-            moved.alike >= ALIKE,
-            "the integral over focus is as 1/r in the middle, wherever in the sweep the focus is passed",
-        ),
-        Finding("the same at rest", f"not alike: below {ALIKE}", plain.alike, "", plain.alike < ALIKE),
-    ]
-    for end in (0, -1):
-        gain = moved.decibels[end] - plain.decibels[end]
-        numbers.append(
-            Finding(
-                f"flat target {away(depths[end])}, one filter for all depths: gain over the sensor at rest",
-                f"details are kept at all depths: {LEAST_GAIN:g} dB or more",
-                gain,
-                "dB",
-                gain >= LEAST_GAIN,
-                f"{moved.decibels[end]:.1f} dB against {plain.decibels[end]:.1f} dB; noise limits",
-            )
-        )
-    for words, each in (("sweeping", moved), ("at rest", plain)):
-        spread = max(each.decibels) - min(each.decibels)
-        numbers.append(Finding(f"how much restored targets differ over depth, {words}", "", spread, "dB"))
-    middle = len(depths) // 2
-    cost = plain.decibels[middle] - moved.decibels[middle]
-    numbers.append(Finding("what the sweep costs in focus", "", cost, "dB", None, "the filter amplifies noise"))
-    return tuple(numbers)
 
 
 ENTRY = Entry(

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.gallery.entry import Finding
+from vcc.gallery.flat_target import flat
 from vcc.light_field import LightField
 from vcc.showcase import figures
 from vcc.showcase.words import length
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -85,7 +82,7 @@ class Sharpness:
             ),
         ]
 
-    def figure(self) -> Figure:
+    def figure(self) -> figures.Figure:
         """Measured points on closed forms."""
         figure = figures.new_figure(10.0, 3.8)
         axes = figure.subplots()
@@ -137,12 +134,8 @@ def fringes(slope: float, width: float, distance: float, lenslets: int) -> Light
     """
     finer = 8
     places = (np.arange(lenslets * finer) - (lenslets * finer - 1) / 2) / finer / PERIOD
-    row = (0.5 + 0.5 * np.cos(2 * np.pi * places)).astype(np.float32)
-    # For a flat object, all views are the same picture if they converge on it.
-    values = np.ascontiguousarray(np.broadcast_to(row, (2, 2, len(row), len(row))))
-    return LightField.from_views(
-        values, width, slope / finer, distance, disparity_range=(0.0, 0.0), sample="point"
-    )
+    row = 0.5 + 0.5 * np.cos(2 * np.pi * places)
+    return flat(np.broadcast_to(row, (len(row), len(row))), width, slope / finer, distance, sample="point")
 
 
 def contrast(row: Array) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from vcc.analysis import OptimisedAperture, expected_deblurring_error, natural_image_power, optimised_aperture
 from vcc.base.measures import decibels
 from vcc.gallery import flat_target
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, below, prose
 from vcc.gallery.flat_target import OPENING
 from vcc.gallery.judged_apertures import (
     BLUR,
@@ -34,10 +33,7 @@ from vcc.optics import Mask
 from vcc.shapes.patterns import Circle, as_pattern, mura
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import filled, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import filled
 
 Array = NDArray[np.float64]
 
@@ -129,7 +125,7 @@ class Run:
         compared = Compared(self.noises, judged, found)
         return Result(
             _text(compared, self.search),
-            tuple((picture,) for picture in _pictures(compared, real)),
+            _pictures(compared, real),
             (*_expected(compared), *_in_order(compared), *_of_searches(compared)),
             bench.assumed,
         )
@@ -261,19 +257,7 @@ def _of_searches(compared: Compared) -> Iterator[Finding]:
 
 def _text(compared: Compared, search: Search) -> str:
     judged = list(compared.judged.values())
-    told = paragraphs(
-        "gallery/prose/good-apertures.txt",
-        judged=judged,
-        focal_length=flat_target.FOCAL_LENGTH,
-        focus=flat_target.FOCUS,
-        target=flat_target.DISTANCE,
-        opening=OPENING,
-        blur=BLUR,
-        annulus=ANNULUS,
-        mean=MEAN,
-        contrast=CONTRAST,
-        search=search,
-    )
+    told = prose(__name__, judged=judged, flat_target=flat_target, search=search)
     table = filled(
         "gallery/prose/good-apertures-table.html",
         noises=compared.noises,
@@ -286,8 +270,8 @@ def _text(compared: Compared, search: Search) -> str:
     return f"{told}\n{table}"
 
 
-def _pictures(compared: Compared, real: Array) -> tuple[Picture, ...]:
-    return (
+def _pictures(compared: Compared, real: Array) -> tuple[tuple[Picture, ...], ...]:
+    return below(
         Picture(
             "patterns",
             "The apertures",
@@ -316,7 +300,7 @@ def _pictures(compared: Compared, real: Array) -> tuple[Picture, ...]:
     )
 
 
-def _patterns_figure(judged: list[Judged]) -> Figure:
+def _patterns_figure(judged: list[Judged]) -> figures.Figure:
     columns = math.ceil(len(judged) / 2)
     figure = figures.new_figure(2.1 * columns, 4.8)
     grid = figure.subplots(2, columns, squeeze=False).ravel()
@@ -329,14 +313,14 @@ def _patterns_figure(judged: list[Judged]) -> Figure:
         pattern = as_pattern(each.mask.pattern)  # type: ignore[arg-type]
         open_parts = pattern.mean(places[None, :], places[:, None], step, step).astype(np.float32)
         title = f"{each.name}\n{100 * each.kernel.sum():.0f} % of the light"
-        figures.put(axes, open_parts, title, cmap="gray", vmin=0, vmax=1)
+        figures.put(axes, open_parts, title)
         for spine in axes.spines.values():
             spine.set_visible(True)
             spine.set_color(figures.QUIET)
     return figure
 
 
-def _errors_figure(compared: Compared) -> Figure:
+def _errors_figure(compared: Compared) -> figures.Figure:
     figure = figures.new_figure(10.5, 4.6)
     grid = figure.subplots(1, 2, sharey=True)
     percent, circle = 100 * np.array(compared.noises), compared.circle
@@ -346,12 +330,10 @@ def _errors_figure(compared: Compared) -> Figure:
             axes.loglog(percent, each.expected / circle.expected, color=colour, linewidth=1.4, label=each.name)
             axes.loglog(percent, getattr(each, kind) / getattr(circle, kind), "o", color=colour, markersize=4)
         axes.set_title(title, fontsize=figures.LABEL, color=figures.INK)
-        axes.set_xlabel("noise [% of white]", fontsize=figures.LABEL)
-        axes.tick_params(labelsize=figures.LABEL)
+        figures.label(axes, "noise [% of white]", "squared error / that of the circle" if axes is grid[0] else "")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter("{x:g}")
         axes.grid(True, which="major", linewidth=0.4)
-    grid[0].set_ylabel("squared error / that of the circle", fontsize=figures.LABEL)
     handles, labels = grid[1].get_legend_handles_labels()
     kinds = [
         grid[0].plot([], [], "-", color=figures.INK, label="foretold: R(K)")[0],
@@ -362,7 +344,7 @@ def _errors_figure(compared: Compared) -> Figure:
     return figure
 
 
-def _deblurred_figure(compared: Compared, real: Array) -> Figure:
+def _deblurred_figure(compared: Compared, real: Array) -> figures.Figure:
     side = min(*real.shape, 120)
     top, left = ((n - side) // 2 for n in real.shape)
     at = compared.noises.index(SHOWN)
@@ -374,12 +356,10 @@ def _deblurred_figure(compared: Compared, real: Array) -> Figure:
         (title, np.clip(picture[top : top + side, left : left + side], 0, 1).astype(np.float32))
         for title, picture in shown
     ]
-    figure = figures.new_figure(11.0, 6.0)
-    figures.fill(figure.subplots(2, 4), (parts[:4], parts[4:]), cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((11.0, 6.0), (parts[:4], parts[4:]))
 
 
-def _search_figure(found: dict[float, OptimisedAperture]) -> Figure:
+def _search_figure(found: dict[float, OptimisedAperture]) -> figures.Figure:
     circle = flat_target.kernel(published()["circular"], BLUR)
     power = natural_image_power((SEARCH_PIXELS, SEARCH_PIXELS), CONTRAST, MEAN)
     figure = figures.new_figure(7.5, 3.6)
@@ -391,9 +371,7 @@ def _search_figure(found: dict[float, OptimisedAperture]) -> Figure:
         axes.plot(np.array(each.typical) / reference, ":", color=colour, linewidth=1.2)
     for words, style in (("the best", "-"), ("median survivor", ":")):
         axes.plot([], [], style, color=figures.INK, label=words)
-    axes.set_xlabel("generation", fontsize=figures.LABEL)
-    axes.set_ylabel("R(K) / that of the circle", fontsize=figures.LABEL)
-    axes.tick_params(labelsize=figures.LABEL, which="both")
+    figures.label(axes, "generation", "R(K) / that of the circle")
     axes.grid(True, linewidth=0.4)
     axes.set_ylim(bottom=0)
     figure.legend(fontsize=figures.LABEL - 1, loc="outside right center")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -11,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.base.measures import decibels, psnr
 from vcc.base.units import um
 from vcc.camera import Camera
 from vcc.gallery import heterodyne_figures
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.gallery.heterodyne_figures import TRANSMITTED
 from vcc.image import Image
 from vcc.light_field import LightField
@@ -31,7 +30,7 @@ from vcc.recover.heterodyne_geometry import PINHOLE_SHARE
 from vcc.shapes.patterns import CosineSum, Open
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, paragraphs
+from vcc.showcase.words import away
 
 Floats = NDArray[np.float32]
 
@@ -120,7 +119,12 @@ class Run:
         compared = Compared.of(bench, camera, images, views, truth, sharper)
         steps()
         numbers = (*compared.findings(), _light_finding(transmission(camera, calibration)))
-        return Result(_text(compared), _pictures(compared), numbers, bench.assumed)
+        return Result(
+            prose(__name__, bench=bench, camera=camera, geometry=HeterodyneGeometry.of(camera), sharper=sharper),
+            _pictures(compared),
+            numbers,
+            bench.assumed,
+        )
 
 
 def _counted(parts: Iterable[LightField], steps: Steps) -> Iterator[LightField]:
@@ -320,9 +324,8 @@ def recorded(camera: Camera, parts: Iterable[LightField]) -> Image:
     """The recording of a light field given in parts: the sum of their recordings."""
     total: Image | None = None
     found = 0.0  # share of the requested rays
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # A part of the views leaves the rest of the sensor dark, but their sum covers it.
-        warnings.simplefilter("ignore", ResultWarning)
         for part in parts:
             # Each view fills its cell of the aperture: no interpolation between views.
             image = camera.capture(part, between_views="none", interpolation="cubic")
@@ -387,7 +390,7 @@ def _pictures(compared: Compared) -> tuple[tuple[Picture, ...], ...]:
         "from decoded views": compared.refocused["decoded"],
         "from the true views": compared.refocused["true"],
     }
-    pictures = (
+    return below(
         Picture(
             "recording",
             "Mask and recording",
@@ -424,7 +427,6 @@ def _pictures(compared: Compared) -> tuple[tuple[Picture, ...], ...]:
             heterodyne_figures.refocus_figure(rows, white),
         ),
     )
-    return tuple((each,) for each in pictures)
 
 
 def _mosaic(views: LightField) -> NDArray[np.generic]:
@@ -432,22 +434,6 @@ def _mosaic(views: LightField) -> NDArray[np.generic]:
     nv, nu, nt, ns = views.shape[:4]
     values = np.moveaxis(np.asarray(views.values), 1, 2)
     return values.reshape(nv * nt, nu * ns, *values.shape[4:])
-
-
-def _text(compared: Compared) -> str:
-    return paragraphs(
-        "gallery/prose/heterodyne.txt",
-        bench=compared.bench,
-        camera=compared.camera,
-        geometry=HeterodyneGeometry.of(compared.camera),
-        sharper=compared.sharper,
-        harmonics=HARMONICS,
-        views=VIEWS,
-        border=BORDER,
-        samples=SAMPLES,
-        well=WELL,
-        read_noise=READ_NOISE,
-    )
 
 
 ENTRY = Entry(

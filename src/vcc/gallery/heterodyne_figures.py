@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,6 @@ from vcc.light_field import LightField
 from vcc.recover.heterodyne import HeterodyneGeometry
 from vcc.showcase import figures
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
@@ -31,7 +27,7 @@ DECADES = 15.0
 """Decades of power shown in spectra, from the strongest down."""
 
 
-def recording_figure(camera: Camera, image: Image, white: float) -> Figure:
+def recording_figure(camera: Camera, image: Image, white: float) -> figures.Figure:
     """The recording, its part with the strongest shadow of the mask, and a corresponding part of the mask.
 
     Args:
@@ -78,13 +74,11 @@ def recording_figure(camera: Camera, image: Image, white: float) -> Figure:
     for axes in (whole, plain, dots, pattern):
         axes.title.set_fontsize(figures.LABEL + 2)
     for axes in (plain, dots, pattern):
-        axes.set_xlabel("x from the middle of the square [mm]", fontsize=figures.LABEL)
-        axes.set_ylabel("y [mm]", fontsize=figures.LABEL)
-    pattern.set_xlabel("x [mm]")
+        figures.label(axes, "x [mm]" if axes is pattern else "x from the middle of the square [mm]", "y [mm]")
     return figure
 
 
-def spectra_figure(camera: Camera, images: dict[str, Image]) -> Figure:
+def spectra_figure(camera: Camera, images: dict[str, Image]) -> figures.Figure:
     """Power spectra of recordings side by side, with the outlines of tiles; the names are the titles."""
     geometry = HeterodyneGeometry.of(camera)
     harmonics = geometry.harmonics
@@ -116,7 +110,7 @@ def spectra_figure(camera: Camera, images: dict[str, Image]) -> Figure:
     return figure
 
 
-def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: float) -> Figure:
+def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: float) -> figures.Figure:
     """Two views of the middle row, near both ends of the aperture.
 
     Args:
@@ -136,19 +130,15 @@ def views_figure(columns: dict[str, tuple[LightField, Array | None]], white: flo
         ]
         for number in numbers
     ]
-    figure = figures.new_figure(4 * 3.6, 2 * (3.6 * nt / ns + 0.3))
     labels = [f"view {number + 1} of {count}" for number in numbers]
-    figures.fill(figure.subplots(2, len(columns)), rows, labels)
-    return figure
+    return figures.table((4 * 3.6, 2 * (3.6 * nt / ns + 0.3)), rows, labels)
 
 
-def refocus_figure(rows: dict[str, dict[str, Floats]], white: float) -> Figure:
+def refocus_figure(rows: dict[str, dict[str, Floats]], white: float) -> figures.Figure:
     """Pictures by the name of a row and that of a place."""
     height, width = next(iter(next(iter(rows.values())).values())).shape[:2]
-    figure = figures.new_figure(3 * 4.4, len(rows) * (4.4 * height / width + 0.3))
     shown = [
         [(place, figures.values_shown(picture, white)) for place, picture in pictures.items()]
         for pictures in rows.values()
     ]
-    figures.fill(figure.subplots(len(rows), 3), shown, list(rows))
-    return figure
+    return figures.table((3 * 4.4, len(rows) * (4.4 * height / width + 0.3)), shown, list(rows))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.errors import ResultWarning
+from vcc.base.errors import without_result_warnings
 from vcc.base.measures import decibels
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, prose
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask, PrismArray
@@ -21,7 +20,7 @@ from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Open
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
-from vcc.showcase.words import length, paragraphs
+from vcc.showcase.words import length
 
 Array = NDArray[np.float64]
 
@@ -108,15 +107,7 @@ def run(bench: Bench, progress: Progress) -> Result:
             for name, view in zip(names, views, strict=True)
         ),
     )
-    text = paragraphs(
-        "gallery/prose/integral-lens-prism.txt",
-        integral=integral,
-        side=SIDE,
-        to_lens=TO_LENS,
-        main=MAIN,
-        opening=OPENING,
-        aperture=APERTURE,
-    )
+    text = prose(__name__, integral=integral)
     return Result(text, pictures, tuple(numbers), bench.assumed)
 
 
@@ -170,9 +161,8 @@ def cut(integral: Integral, recorded: NDArray[np.float32]) -> LightField:
 
 
 def _captured(camera: Camera, light_field: LightField) -> Image:
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # Some pixels lie outside the views; the comparison with the truth includes them.
-        warnings.simplefilter("ignore", ResultWarning)
         return camera.capture(light_field, samples=32)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +12,6 @@ from vcc.analysis import expected_deblurring_error, natural_image_power
 from vcc.gallery import flat_target
 from vcc.optics import Mask
 from vcc.recover import wiener
-
-if TYPE_CHECKING:
-    pass
 
 Array = NDArray[np.float64]
 

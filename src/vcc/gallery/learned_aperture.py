@@ -14,8 +14,9 @@ from vcc.base import lazy_import
 from vcc.base.errors import InputError
 from vcc.base.units import mm, um
 from vcc.camera import Camera
+from vcc.gallery import flat_target
 from vcc.gallery.diffusercam import drawn
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.gallery.published_codes import VEERARAGHAVAN
 from vcc.light_field import LightField
 from vcc.optics import Lens, Mask
@@ -24,7 +25,6 @@ from vcc.optics.sensor import Sensor
 from vcc.recording import expose_image
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
 
 Array = NDArray[Any]
 
@@ -65,11 +65,8 @@ def camera_of(code: Array, side: int) -> Camera:
 
 
 def flat(target: Array, distance: float) -> LightField:
-    """A flat target: all views are the same image, and converge on it."""
-    views = np.broadcast_to(target.astype(np.float32), (VIEWS, VIEWS, *target.shape))
-    return LightField.from_views(
-        np.ascontiguousarray(views), OPENING / VIEWS, slope(), distance, disparity_range=(0.0, 0.0)
-    )
+    """A flat target at a distance."""
+    return flat_target.flat(target, OPENING / VIEWS, slope(), distance, VIEWS)
 
 
 def point() -> Array:
@@ -246,23 +243,13 @@ def measured(
 
 
 def _text(run: Run, judged: Mapping[str, Judged]) -> str:
-    return paragraphs(
-        "gallery/prose/learned-aperture.txt",
+    return prose(
+        __name__,
         run=run,
-        views=VIEWS,
-        opening=OPENING,
-        focal_length=FOCAL_LENGTH,
-        focus=FOCUS,
-        pitch=PITCH,
-        blurs=BLURS,
         near=distance_of(BLURS[-1]),
         far=distance_of(BLURS[0]),
-        patch=PATCH,
-        contrast=CONTRAST,
-        share=SHARE,
         every=lazy_import.module("vcc.gallery.torch_aperture").EVERY,
         pictures=len(TRAINING_SEEDS),
-        electronics=ELECTRONICS,
         patches=judged["learned"].patches,
         spread=550e-9 * FOCAL_LENGTH / (OPENING / VIEWS),
     )
@@ -301,7 +288,6 @@ def _findings(judged: Mapping[str, Judged]) -> Iterator[Finding]:
 
 
 def _pictures(judged: Mapping[str, Judged]) -> tuple[tuple[Picture, ...], ...]:
-    figure = figures.new_figure(9.0, 4.6)
     names = list(judged)
     codes = [
         (
@@ -319,16 +305,13 @@ def _pictures(judged: Mapping[str, Judged]) -> tuple[tuple[Picture, ...], ...]:
         ),
     ]
     labels = ["code", *(f"{BLURS[n]:g} pixels" for n in shown)]
-    figures.fill(figure.subplots(len(rows), len(names), squeeze=False), rows, labels, cmap="gray", vmin=0, vmax=1)
-    return (
-        (
-            Picture(
-                "codes",
-                "The codes, and their images of a point",
-                "Below the name: the mean error on the drawn picture and on the view, pixels of blur. All "
-                "networks have the same size, training and start.",
-                figure,
-            ),
+    return below(
+        Picture(
+            "codes",
+            "The codes, and their images of a point",
+            "Below the name: the mean error on the drawn picture and on the view, pixels of blur. All "
+            "networks have the same size, training and start.",
+            figures.table((9.0, 4.6), rows, labels),
         ),
     )
 

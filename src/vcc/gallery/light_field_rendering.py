@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.base.measures import psnr
 from vcc.base.units import mm
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, prose
 from vcc.light_field import LightField
 from vcc.optics import Mask
 from vcc.optics.sensor import Sensor
 from vcc.shapes.patterns import Circle
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import length, paragraphs
+from vcc.showcase.words import length
 
 STEP = 20 * mm
 """Distance of new viewpoints before and behind the plane of the views."""
@@ -54,7 +53,7 @@ def run(bench: Bench, progress: Progress) -> Result:
         (_left_out_picture(truth, predicted, decibels),),
         tuple(Picture(f"from-{name}", title, caption, content) for name, title, caption, content in moved),
     )
-    text = paragraphs("gallery/prose/light-field-rendering.txt", views=light_field.shape[:2], step=STEP)
+    text = prose(__name__, views=light_field.shape[:2])
     return Result(text, pictures, (*_predictions(decibels), *found), bench.assumed)
 
 
@@ -153,9 +152,8 @@ def pinhole_picture(
         decentre=(hole[0] + distance * middle[0], hole[1] + distance * middle[1]),
     )
     camera = Camera([Mask(Circle(diameter), z=z, decentre=hole, name="pinhole")], sensor)
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # The border of the image lies outside the views; comparisons exclude it.
-        warnings.simplefilter("ignore", ResultWarning)
         image = camera.capture(given, method="rays", samples=64).to_numpy()
     values = image.astype(np.float64) * distance**2 / (math.pi / 4 * diameter**2)
     # On the sensor, slopes grow with rows and columns; the rows and columns of the views may have the
@@ -184,16 +182,8 @@ def _from_elsewhere(
         if bench.scene is not None:
             closeness = _psnr(picture, _true_view(bench, (u, v), (s, t), way))
             caption += f" {closeness:.1f} dB against the scene’s closed form."
-            numbers.append(
-                Finding(
-                    f"view from {length(STEP)} {name} the plane of cameras: PSNR",
-                    "",
-                    closeness,
-                    "dB",
-                    None,
-                    why,
-                )
-            )
+            what = f"view from {length(STEP)} {name} the plane of cameras: PSNR"
+            numbers.append(Finding(what, "", closeness, "dB", None, why))
         pictures.append((name, title, caption, figures.values_shown(picture)))
     return pictures, numbers
 

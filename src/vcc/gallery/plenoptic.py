@@ -6,18 +6,17 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import Refocuser
 from vcc.base import measures
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, ResultWarning, without_result_warnings
 from vcc.base.units import um
 from vcc.camera import Camera
 from vcc.gallery import fringes
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, LensArray, PhasePlate
@@ -29,10 +28,7 @@ from vcc.shapes.patterns import Circle
 from vcc.shapes.surfaces import Surface, Zernike
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import away, length, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away, length
 
 Array = NDArray[np.float64]
 
@@ -139,9 +135,8 @@ class Plenoptic:
 
 
 def _captured(camera: Camera, light_field: LightField, samples: int) -> Image:
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # A few rays miss the views at the image's borders, which comparisons exclude.
-        warnings.simplefilter("ignore", ResultWarning)
         return camera.capture(light_field, method="rays", samples=samples)
 
 
@@ -172,7 +167,7 @@ class Run:
         aberrated = Aberrated.of(plenoptic, white, refocused)
         numbers = (*refocused.findings(), *sharpness.findings(), *aberrated.findings(plenoptic))
         pictures = _pictures(plenoptic, raw, decoded, refocused, sharpness, aberrated)
-        return Result(_text(plenoptic), tuple((each,) for each in pictures), numbers, bench.assumed)
+        return Result(_text(plenoptic), pictures, numbers, bench.assumed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -340,7 +335,7 @@ def _pictures(
     refocused: Refocused,
     sharpness: fringes.Sharpness,
     aberrated: Aberrated,
-) -> tuple[Picture, ...]:
+) -> tuple[tuple[Picture, ...], ...]:
     size = max(min(plenoptic.lenslets) // 12, 12)
     near, chart, _ = figures.detailed_crops([refocused.shown(each) for each in refocused.pictures], size)
     wide = min(4 * size, min(plenoptic.lenslets))
@@ -351,7 +346,7 @@ def _pictures(
         (f"corrected: {after:.1f} dB", refocused.shown(aberrated.after)),
         ("ideal camera", refocused.shown(aberrated.ideal)),
     ]
-    return (
+    return below(
         Picture(
             "raw",
             "The raw recording, and a piece of it",
@@ -394,7 +389,7 @@ def _inner(decoded: LightField) -> NDArray[np.float32]:
     return np.asarray(decoded.values[1:-1, 1:-1], dtype=np.float32)
 
 
-def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> Figure:
+def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> figures.Figure:
     """Pictures in rows, each below its title."""
     ratios = [row[0][1].shape[0] / row[0][1].shape[1] for row in rows]
     figure = figures.new_figure(11.5, 0.7 + 3.8 * sum(ratios))
@@ -402,35 +397,20 @@ def _table(rows: Sequence[Sequence[tuple[str, figures.Shown]]]) -> Figure:
     return figure
 
 
-def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: float) -> Figure:
+def _raw_figure(plenoptic: Plenoptic, raw: Image, near: figures.Crop, peak: float) -> figures.Figure:
     """The whole, and an enlarged part that is sharp when focused near."""
-    from matplotlib.patches import Rectangle
-
     upright = _values(raw.upright()) / (math.pi / 4 * (plenoptic.pitch / plenoptic.gap) ** 2)
     each = plenoptic.each
     piece = figures.Crop(near.row * each, near.column * each, near.size * each)
-    figure = figures.new_figure(11.5, 0.4 + 5.6 * upright.shape[0] / upright.shape[1])
-    whole, part = figure.subplots(1, 2, width_ratios=(upright.shape[1] / upright.shape[0], 1))
     rows, columns = plenoptic.lenslets
     title = f"whole: {rows}×{columns} lenslets, {each}×{each} pixels behind each"
-    all_shown = figures.values_shown(upright, peak)
-    figures.put(whole, all_shown, title).set_interpolation("antialiased")
-    whole.add_patch(
-        Rectangle((piece.column, piece.row), piece.size, piece.size, fill=False, color=figures.ACCENT, linewidth=2)
-    )
-    figures.put(part, piece.of(all_shown), f"the marked piece: {near.size}×{near.size} lenslets")
-    return figure
+    of_piece = f"the marked piece: {near.size}×{near.size} lenslets"
+    return figures.enlarged(figures.values_shown(upright, peak), piece, (title, of_piece))
 
 
 def _text(plenoptic: Plenoptic) -> str:
-    return paragraphs(
-        "gallery/prose/plenoptic.txt",
-        camera=plenoptic,
-        published=math.isclose(plenoptic.pitch, PITCH) and math.isclose(plenoptic.gap, F_NUMBER * PITCH),
-        margin=MARGIN,
-        spherical=SPHERICAL / um,
-        coma=COMA / um,
-    )
+    published = math.isclose(plenoptic.pitch, PITCH) and math.isclose(plenoptic.gap, F_NUMBER * PITCH)
+    return prose(__name__, camera=plenoptic, published=published)
 
 
 ENTRY = Entry(

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcc.analysis import distortion, field_curvature, psf, relative_illumination
-from vcc.base.affine import Affine
 from vcc.base.cached import cached
-from vcc.base.errors import ResultWarning
+from vcc.base.errors import without_result_warnings
 from vcc.base.measures import psnr
 from vcc.base.units import mm, nm, um
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
+from vcc.gallery.flat_target import flat
 from vcc.image import Image
 from vcc.light_field import LightField
 from vcc.optics import Lens, RealLens
@@ -27,10 +26,7 @@ from vcc.optics.sensor import Sensor
 from vcc.prescriptions import load_lens
 from vcc.showcase import figures
 from vcc.showcase.bench import APERTURE, Bench
-from vcc.showcase.words import away, paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from vcc.showcase.words import away
 
 Array = NDArray[np.float64]
 
@@ -187,8 +183,8 @@ class Run:
             *_illumination(setup, even),
         ]
         step()
-        text = paragraphs(
-            "gallery/prose/real-lens.txt",
+        text = prose(
+            __name__,
             setup=setup,
             pupil=_pupil(OPEN),
             views=setup.field.shape[0],
@@ -271,10 +267,10 @@ def _spot(setup: Setup, rays: int) -> Finding:
     expected = math.sqrt(float((heights * (behind * slopes) ** 2).sum() / heights.sum()))
     pitch = expected / 12
     sensor = Sensor(setup.paraxial(OPEN).sensor.z, (73, 73), pitch)
-    with warnings.catch_warnings():
+    spacing, slope = 1.05 * _pupil(OPEN) / POINT_VIEWS, POINT_WIDTH / setup.image_distance
+    point = flat(np.ones((1, 1, 1)), spacing, slope, setup.focus, POINT_VIEWS)
+    with without_result_warnings():
         # The light field holds only the point: most of the sensor's rays are missing.
-        warnings.simplefilter("ignore", ResultWarning)
-        point = _point(setup, _pupil(OPEN))
         values = Camera([lens], sensor).capture(point, between_views="none", samples=rays).to_numpy()[..., 0]
     squared = sensor.column_places[None, :] ** 2 + sensor.row_places[:, None] ** 2
     # A square of width w adds w²/6 to the mean square: the pixel, and the point's own width.
@@ -291,15 +287,6 @@ def _spot(setup: Setup, rays: int) -> Finding:
         f"spherical aberration: the marginal ray crosses the axis {marginal / um:+.0f} µm from the paraxial "
         f"focus, the zone {zone / um:+.0f} µm",
     )
-
-
-def _point(setup: Setup, width: float) -> LightField:
-    """A point on the axis, in focus: one pixel a view, all of which look at it."""
-    spacing, middle, wide = 1.05 * width / POINT_VIEWS, (POINT_VIEWS - 1) / 2, POINT_WIDTH / setup.image_distance
-    matrix = np.diag([spacing, spacing, -wide, -wide, 1.0])
-    matrix[2, 0] = matrix[3, 1] = spacing / setup.focus
-    frame = Affine(matrix) @ Affine.translation(-middle, -middle, 0, 0)
-    return LightField(np.ones((POINT_VIEWS, POINT_VIEWS, 1, 1, 1), np.float32), frame)
 
 
 # -- findings: curvature and light over the field
@@ -339,9 +326,7 @@ def _corner_foci(setup: Setup) -> str:
 def _even(setup: Setup, f_number: float, rays: int) -> Array:
     """Captured irradiance of an even scene at `FIELDS` along the diagonal, over that on the axis."""
     slope, views, pixels = 1.6 * setup.corner, setup.field.shape[0], 8
-    even = LightField.from_views(
-        np.ones((views, views, pixels, pixels, 1), np.float32), WIDTH / views, slope * 2 / pixels, setup.focus
-    )
+    even = flat(np.ones((pixels, pixels, 1)), WIDTH / views, slope * 2 / pixels, setup.focus, views)
     camera = setup.real[f_number]
     height = setup.corner * setup.image_distance
     values = []
@@ -432,9 +417,11 @@ def _pictures(
     columns = list(shown.items())
     return (
         (thin, real, stopped),
-        (Picture("close-ups", "Close-ups", _CLOSE_UPS, _close_ups(setup, columns)),),
-        (Picture("points", "Points over the field", _POINTS, _point_figure(setup, detail)),),
-        (Picture("curves", "Aberrations and light", _CURVES, _curve_figure(setup, even)),),
+        *below(
+            Picture("close-ups", "Close-ups", _CLOSE_UPS, _close_ups(setup, columns)),
+            Picture("points", "Points over the field", _POINTS, _point_figure(setup, detail)),
+            Picture("curves", "Aberrations and light", _CURVES, _curve_figure(setup, even)),
+        ),
     )
 
 
@@ -455,7 +442,7 @@ _CURVES = (
 )
 
 
-def _close_ups(setup: Setup, columns: list[tuple[str, figures.Shown]]) -> Figure:
+def _close_ups(setup: Setup, columns: list[tuple[str, figures.Shown]]) -> figures.Figure:
     rows, count = setup.shape
     size = max(min(rows, count) // 5, 8)
     wide = [
@@ -466,7 +453,7 @@ def _close_ups(setup: Setup, columns: list[tuple[str, figures.Shown]]) -> Figure
     return figures.close_ups(columns, [crop for _, crop in wide], [name for name, _ in wide])
 
 
-def _point_figure(setup: Setup, detail: int) -> Figure:
+def _point_figure(setup: Setup, detail: int) -> figures.Figure:
     cameras = ((f"f/{OPEN:g}", setup.real[OPEN]), (f"f/{STOPPED:g}", setup.real[STOPPED]))
     blur = _pupil(OPEN) * setup.image_distance * abs(1 / setup.far - 1 / setup.focus)
     figure = figures.new_figure(8.6, 6.8)
@@ -488,14 +475,14 @@ def _point_figure(setup: Setup, detail: int) -> Figure:
                 brightest = np.quantile(spread[spread > 0], 0.995)
                 grey = figures.grey_shown(spread / brightest)
                 title = {0.0: "axis", 1.0: "corner"}.get(field, f"{field:g} of the way")
-                figures.put(axes, grey, "" if half or row else title, cmap="gray", vmin=0, vmax=1)
+                figures.put(axes, grey, "" if half or row else title)
             grid[2 * half + row][0].set_ylabel(
                 f"{name}, {words}\n{width / um:.0f} µm", fontsize=figures.LABEL, color=figures.INK
             )
     return figure
 
 
-def _curve_figure(setup: Setup, even: dict[float, Array]) -> Figure:
+def _curve_figure(setup: Setup, even: dict[float, Array]) -> figures.Figure:
     figure = figures.new_figure(10, 3.4)
     spherical, curved, light = figure.subplots(1, 3)
     lens = _lens(OPEN, "real")
@@ -519,9 +506,7 @@ def _curve_figure(setup: Setup, even: dict[float, Array]) -> Figure:
         (curved, "focus [µm behind the paraxial one]", "height on the sensor [mm]"),
         (light, "height on the sensor [mm]", "irradiance over that on the axis"),
     ):
-        axes.set_xlabel(across, fontsize=figures.LABEL)
-        axes.set_ylabel(up, fontsize=figures.LABEL)
-        axes.tick_params(labelsize=figures.LABEL)
+        figures.label(axes, across, up)
         if axes is not spherical:
             axes.legend(fontsize=figures.LABEL, frameon=False)
     return figure

@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcc.base.errors import InputError, ResultWarning
+from vcc.base.errors import InputError, without_result_warnings
 from vcc.base.measures import psnr
 from vcc.base.units import mm, nm
 from vcc.camera import Camera
-from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps
+from vcc.gallery.entry import Entry, Finding, Picture, Progress, Result, Steps, below, prose
 from vcc.light_field import LightField
 from vcc.optics import Mask, Prism
 from vcc.optics.sensor import Sensor
 from vcc.showcase import figures
 from vcc.showcase.bench import Bench
-from vcc.showcase.words import paragraphs
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float32]
 
@@ -146,9 +140,8 @@ def traced(layers: Array, row: int, column: int) -> Array:
     light = LightField.from_views(np.ones((1, 1, 1, 1), np.float32), wide, NARROW * STEP, math.inf)
     masks = [Mask(each, width, height, z=GAP * place) for place, each in enumerate(layers)]
     sensor = Sensor(GAP * (count - 1) + GAP * 1e-6, (rows, columns), PITCH)
-    with warnings.catch_warnings():
+    with without_result_warnings():
         # A bare sensor asks for rays of all directions, and the backlight is parallel on purpose.
-        warnings.simplefilter("ignore", ResultWarning)
         images = [
             Camera([Prism(tilt), *stack], sensor).capture(light, method="rays", samples=SAMPLES).to_numpy()
             for stack in (masks, [])
@@ -214,7 +207,12 @@ class Run:
         error = float(np.sqrt(np.mean(np.square(differences))))
         advance()
         measured = Measured(target, shown, barrier(target), display, error)
-        return Result(_text(self, measured), _pictures(measured), tuple(_findings(measured)), bench.assumed)
+        return Result(
+            prose(__name__, run=self, shape=target.shape[2:]),
+            _pictures(measured),
+            tuple(_findings(measured)),
+            bench.assumed,
+        )
 
 
 def target_of(bench: Bench, side: int) -> Array:
@@ -258,21 +256,6 @@ def barrier(target: Array) -> Array:
     return made
 
 
-def _text(run: Run, measured: Measured) -> str:
-    return paragraphs(
-        "gallery/prose/tensor-display.txt",
-        run=run,
-        views=VIEWS,
-        shape=measured.target.shape[2:],
-        pitch=PITCH,
-        gap=GAP,
-        step=STEP,
-        frames=FRAMES,
-        brightness=BRIGHTNESS,
-        spread=WAVELENGTH * GAP / PITCH,
-    )
-
-
 def _findings(measured: Measured) -> Iterator[Finding]:
     decibels = {kind: measured.decibels(shown) for kind, shown in measured.shown.items()}
     best = decibels[3, FRAMES]
@@ -291,22 +274,13 @@ def _findings(measured: Measured) -> Iterator[Finding]:
         ("three layers in one frame", (3, 1), LEAST_GAIN, "a product of layers has rank 1 for each frame"),
         (f"two layers in {FRAMES} frames", (2, FRAMES), 0.0, "more layers reach more depth"),
     ):
-        yield Finding(
-            f"the same: gain over {words}",
-            f"{least:g} dB or more" if least else "better",
-            best - decibels[kind],
-            "dB",
-            best - decibels[kind] >= least,
-            f"{best:.1f} dB against {decibels[kind]:.1f} dB: {why}",
-        )
-    held = measured.decibels(measured.barrier)
-    yield Finding(
+        yield Finding.gain(f"the same: gain over {words}", best, decibels[kind], least, why)
+    yield Finding.gain(
         "the same: gain over a parallax barrier of the same cells",
-        f"{LEAST_GAIN:g} dB or more",
-        best - held,
-        "dB",
-        best - held >= LEAST_GAIN,
-        f"{best:.1f} dB against {held:.1f} dB: the barrier has one cell in {VIEWS**2} for each view",
+        best,
+        measured.decibels(measured.barrier),
+        LEAST_GAIN,
+        f"the barrier has one cell in {VIEWS**2} for each view",
     )
     light = float(measured.shown[3, FRAMES].mean() / measured.target.mean())
     yield Finding(
@@ -336,18 +310,14 @@ def _pictures(measured: Measured) -> tuple[tuple[Picture, ...], ...]:
             error = np.abs(measured.shown[3, FRAMES][corner] - measured.target[corner])
             line.append((f"3 layers, {FRAMES} frames: error × 5", _shown(5 * error)))
         rows.append(line)
-    overview = figures.new_figure(9.0, 6.4)
-    figures.fill(overview.subplots(2, 3, squeeze=False), rows, cmap="gray", vmin=0, vmax=1)
-    return (
-        (
-            Picture(
-                "views",
-                "The view from the upper right corner",
-                "PSNR is over all views. The barrier is shown at the brightness of the others.",
-                overview,
-            ),
+    return below(
+        Picture(
+            "views",
+            "The view from the upper right corner",
+            "PSNR is over all views. The barrier is shown at the brightness of the others.",
+            figures.table((9.0, 6.4), rows),
         ),
-        (Picture("layers", "The layers in two frames", "From back to front.", _layers(measured.display)),),
+        Picture("layers", "The layers in two frames", "From back to front.", _layers(measured.display)),
     )
 
 
@@ -355,9 +325,8 @@ def _titled(words: str, shown: Array, measured: Measured) -> str:
     return words if shown is measured.target else f"{words}: {measured.decibels(shown):.1f} dB"
 
 
-def _layers(display: Display) -> Figure:
+def _layers(display: Display) -> figures.Figure:
     frames: Sequence[int] = (0, 1)
-    figure = figures.new_figure(9.0, 6.4)
     rows = [
         [
             (f"layer {place + 1}" if frame == 0 else "", figures.grey_shown(each))
@@ -366,8 +335,7 @@ def _layers(display: Display) -> Figure:
         for frame in frames
     ]
     labels = [f"frame {frame + 1}" for frame in frames]
-    figures.fill(figure.subplots(2, 3, squeeze=False), rows, labels, cmap="gray", vmin=0, vmax=1)
-    return figure
+    return figures.table((9.0, 6.4), rows, labels)
 
 
 def _shown(view: Array) -> figures.Shown:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +22,7 @@ from vcc.recover.blur import Blur, Borders, channels_first, channels_last
 from vcc.recover.recorded import numbers_of
 
 Array = NDArray[np.float64]
+AnyFloats = TypeVar("AnyFloats", NDArray[np.float32], NDArray[np.float64])
 
 _PRESENT = 1e-9
 """Without noise, frequencies that pass with a smaller amplitude count as lost: they would amplify rounding errors
@@ -363,17 +365,17 @@ class _Surprise:
             left = self.blur.apply(estimate) - channel
             value += float((left**2).sum()) / (2 * self.noise**2)
             out[...] = self.blur.adjoint(left) / self.noise**2
-        edges = _gradient(whole)
+        edges = gradient(whole)
         small = (_SMOOTHED * self.scale) ** 2
         squared = ((edges**2).sum(axis=(0, 1)) + small) / self.scale**2
         value += float((squared ** (self.exponent / 2)).sum())
-        slope += _divergence_of(edges * (self.exponent / self.scale**2 * squared ** (self.exponent / 2 - 1)))
+        slope += gradient_adjoint(edges * (self.exponent / self.scale**2 * squared ** (self.exponent / 2 - 1)))
         return value, slope.ravel()
 
 
 def _likeliest_scale(pictures: Array, exponent: float, noise: float) -> float:
     """The most likely b for images (channels, rows, columns)."""
-    lengths = np.sqrt((_gradient(pictures) ** 2).sum(axis=(0, 1)))
+    lengths = np.sqrt((gradient(pictures) ** 2).sum(axis=(0, 1)))
     mean = exponent * float((lengths**exponent).sum()) / pictures.size
     return max(float(mean ** (1 / exponent)), 1e-3 * noise)  # for an image without gradients
 
@@ -393,17 +395,17 @@ def _linear_estimate(
     return found
 
 
-def _gradient(whole: Array) -> Array:
+def gradient(whole: AnyFloats) -> AnyFloats:
     """Forward differences down and right of (channels, rows, columns), zero at the far borders: (2, …)."""
-    found = np.zeros((2, *whole.shape))
+    found = np.zeros((2, *whole.shape), whole.dtype)
     found[0, :, :-1] = np.diff(whole, axis=1)
     found[1, :, :, :-1] = np.diff(whole, axis=2)
     return found
 
 
-def _divergence_of(edges: Array) -> Array:
-    """The adjoint of `_gradient`."""
-    found = np.zeros(edges.shape[1:])
+def gradient_adjoint(edges: AnyFloats) -> AnyFloats:
+    """The adjoint of `gradient`, (channels, rows, columns)."""
+    found = np.zeros(edges.shape[1:], edges.dtype)
     found[:, :-1] -= edges[0, :, :-1]
     found[:, 1:] += edges[0, :, :-1]
     found[:, :, :-1] -= edges[1, :, :, :-1]

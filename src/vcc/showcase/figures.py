@@ -22,13 +22,15 @@ from vcc.optics.sensor import Sensor
 from vcc.plot import plot_phase_space_stages
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Figure
 
 Shown = NDArray[np.float32]
 
 INK, QUIET, ACCENT = "#222222", "#666666", "#D55E00"
 LABEL = 9
 """Size of labels, points."""
+GREY = {"cmap": "gray", "vmin": 0, "vmax": 1}
+"""How pictures without colours are drawn: 0 is black, 1 is white."""
 SHEET_WIDTH, HIGHEST_ROW = 15.0, 6.8
 """Of the contact sheet, inches."""
 
@@ -155,13 +157,11 @@ def close_ups(columns: Sequence[tuple[str, Shown]], crops: Sequence[Crop], rows:
         crops: the places.
         rows: labels of the places.
     """
-    figure = new_figure(2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35)
     pictures = [
         [(title if row == 0 else "", crop.of(picture)) for title, picture in columns]
         for row, crop in enumerate(crops)
     ]
-    fill(figure.subplots(len(crops), len(columns), squeeze=False), pictures, rows)
-    return figure
+    return table((2.3 * len(columns) + 0.3, 2.3 * len(crops) + 0.35), pictures, rows)
 
 
 def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[str] = (), **options: Any) -> None:
@@ -182,9 +182,62 @@ def fill(grid: Any, rows: Sequence[Sequence[tuple[str, Any]]], labels: Sequence[
         line[0].set_ylabel(words, fontsize=LABEL, color=INK)
 
 
+def table(
+    size: tuple[float, float],
+    rows: Sequence[Sequence[tuple[str, Any]]],
+    labels: Sequence[str] = (),
+    **options: Any,
+) -> Figure:
+    """Pictures in rows, each below its title.
+
+    Args:
+        size: (width, height) of the figure, inches.
+        rows: titles and pictures; places at the end of a shorter row stay empty.
+        labels: to the left of the rows.
+        options: of `put`.
+    """
+    figure = new_figure(*size)
+    fill(figure.subplots(len(rows), max(map(len, rows)), squeeze=False), rows, labels, **options)
+    return figure
+
+
+def enlarged(whole: Shown, piece: Crop, titles: tuple[str, str]) -> Figure:
+    """A picture in which a square is marked, and next to it this square, enlarged.
+
+    Args:
+        whole: (rows, columns, 3).
+        piece: the square.
+        titles: of both.
+    """
+    from matplotlib.patches import Rectangle
+
+    ratio = whole.shape[1] / whole.shape[0]
+    figure = new_figure(11.5, 0.4 + 5.6 / ratio)
+    left, right = figure.subplots(1, 2, width_ratios=(ratio, 1))
+    put(left, whole, titles[0]).set_interpolation("antialiased")
+    mark = Rectangle((piece.column, piece.row), piece.size, piece.size, fill=False, color=ACCENT, linewidth=2)
+    left.add_patch(mark)
+    put(right, piece.of(whole), titles[1])
+    return figure
+
+
+def label(axes: Any, across: str, up: str) -> None:
+    """Label the axes of a graph."""
+    axes.set_xlabel(across, fontsize=LABEL)
+    axes.set_ylabel(up, fontsize=LABEL)
+    axes.tick_params(labelsize=LABEL - 1, which="both")
+
+
 def put(axes: Any, picture: Shown, title: str = "", **options: Any) -> Any:
-    """Put a picture on axes without ticks; pixels stay square and sharp."""
-    image = axes.imshow(picture, interpolation="nearest", **options)
+    """Put a picture on axes without ticks; pixels stay square and sharp.
+
+    Args:
+        axes: where to draw.
+        picture: (rows, columns, 3), or (rows, columns): by default grey, see `GREY`.
+        title: above it.
+        options: of ``imshow``, in place of the default.
+    """
+    image = axes.imshow(picture, interpolation="nearest", **(options or (GREY if picture.ndim == 2 else {})))
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():
