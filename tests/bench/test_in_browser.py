@@ -1,5 +1,6 @@
 """The bench in headless Chromium: by mouse, keys and typing, in two windows, without a server."""
 
+import io
 import json
 import runpy
 import tomllib
@@ -11,6 +12,8 @@ import pytest
 
 import vcc
 from tests.bench.browser import AXE, Page
+from vcc.bench.document import Document
+from vcc.prescriptions import built_in_lenses
 
 
 def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
@@ -59,9 +62,9 @@ def test_what_is_too_large_to_be_sent_is_named_and_the_bench_goes_on(page):
             const { bench } = document.querySelector("vcc-bench");
             const where = ["elements", 0, "pattern"];
             bench.act({ do: "upload", where, name: "leaf.png" }, [new ArrayBuffer(33.5 * 2 ** 20)]);
-            const upload = bench.refused.words;
+            const upload = bench.refused[0].words;
             bench.act({ do: "hello", document: { camera: "x".repeat(2 ** 25) } });
-            return [upload, bench.refused.words];
+            return [upload, bench.refused[0].words];
         }"""
     )
     assert "leaf.png has 33.5 MiB, and a bench takes up to 32 MiB" in words[0]
@@ -332,6 +335,38 @@ def test_program_that_is_taken_away_makes_the_identical_picture(page, tmp_path, 
         warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
         runpy.run_path("picture.py")
     assert (tmp_path / "picture.png").read_bytes() == (tmp_path / "wanted.png").read_bytes()
+
+
+def test_pictures_of_each_kind_of_element_are_taken_away_as_the_library_makes_them(page, served):
+    field = served.offered.fields["scene"].whole()
+    adds = page.page.get_by_label("Add an element")
+    kinds = [each.get_attribute("value") for each in adds.locator("option").all()]
+    assert len(kinds) > 15
+    for kind in kinds:
+        if not kind or kind in built_in_lenses():  # these: test_editing.py
+            continue
+        adds.select_option(kind)
+        page.page.get_by_role("tab", name=kind.replace("_", " ")).first.wait_for()
+        page.settle()
+        page.page.get_by_text("Export").click()
+        with page.page.expect_download() as taken:
+            page.page.get_by_role("button", name="Picture (PNG)").click()
+        document, white = page.page.evaluate(
+            """() => {
+                const { bench } = document.querySelector("vcc-bench");
+                return [bench.document, bench.picture.about.white];
+            }"""
+        )
+        shown = Document.of_json(document)
+        train = shown.train(served.offered.beside).train
+        expected = io.BytesIO()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", vcc.ResultWarning)  # of rays that are missing
+            image = vcc.Camera(train.elements, train.sensor).capture(shown.coloured(field))
+            image.save(expected, format="png", exposure=1 / white)
+        assert Path(taken.value.path()).read_bytes() == expected.getvalue(), kind
+        page.button("Undo").click()
+        page.settle()
 
 
 def test_neighbours_trade_places_by_their_buttons(page):

@@ -328,9 +328,13 @@ def test_a_document_of_a_link_is_taken_or_refused(client):
     client.do("hello", document=moved.as_json())
     client.until("state")
     assert client.session.document == moved
-    client.do("hello", document={"camera": 5})
-    assert "document" in client.until("refused")[0]["words"]
-    client.until("state")
+    other = Client()
+    other.do("hello", document={"camera": 5})
+    assert "document" in other.until("refused")[0]["words"]
+    other.until("state")
+    other.do("hello", changes=[5])
+    assert "changes is a list" in other.until("refused")[0]["words"]
+    other.close()
 
 
 def test_answers(client):

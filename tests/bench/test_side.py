@@ -138,6 +138,11 @@ def test_handles_change_what_they_stand_on():
     circle = {"kind": "mask", "pattern": {"name": "circle", "diameter": "6 mm"}}
     (_, size) = drawn(with_element(**circle))["elements"][1]["handles"]
     assert (size["where"], size["value"]) == (["pattern", "diameter"], 6 * mm)
+    cone = {"kind": "angle_filter", "z": "40 mm", "pattern": {"name": "circle", "diameter": "0.3 m"}}
+    (_, steepest) = drawn(with_element(**cone))["elements"][1]["handles"]
+    assert (steepest["where"], steepest["value"]) == (["pattern", "diameter"], 0.3)
+    assert (steepest["z"], steepest["height"]) == (-40 * mm, pytest.approx(6 * mm))  # slope 0.15, 40 mm before it
+    assert steepest["rate"] * 40 * mm / 2 == pytest.approx(1)  # the ray follows the hand
 
 
 def test_it_is_json_whatever_is_infinite():

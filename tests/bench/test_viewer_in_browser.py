@@ -196,10 +196,20 @@ def test_places_in_fields_and_drawing_agree_while_the_server_is_away(page, serve
     assert page.page.locator("#sensor-z").input_value() == drawn.removesuffix(" mm")
     page.page.get_by_label("Add an element").select_option("diffuser")
     page.page.get_by_text("This was not done, because there is no connection").wait_for()
+    for field, typed in (("sensor-z", "far"), ("sensor-pitch", "0.2 mm"), ("sensor-decentre", "wide, 0 mm")):
+        page.page.locator(f"#{field}").fill(typed)
+        page.page.keyboard.press("Enter")
     served.start()
     page.page.get_by_text("The server is gone").wait_for(state="detached")
     page.settle()
-    assert page.place("sensor") == drawn
+    # Only what makes no sense is refused, each at its field; all else that was changed meanwhile is kept.
+    assert page.place("sensor") == "52 mm"
+    assert page.page.locator("#sensor-pitch").input_value() == "0.2 mm"
+    assert page.page.locator("#sensor-decentre").input_value() == ""
+    words = [each.text_content() for each in page.page.get_by_role("alert").all()]
+    assert len(words) == 2
+    assert 'z is "far", which is not a length; write it like 50 mm' in words[0]
+    assert "decentre" in words[1]
 
 
 def test_page_without_the_token_says_what_is_missing_and_does_not_try_for_ever(browser, served):

@@ -545,7 +545,7 @@ MASK = r'element 2 \(mask "code"\): pattern'
         (element(None) + SENSOR, 'element 1 has no kind: add kind = … with one of "angle_filter", "biprism'),
         (element("stop") + SENSOR, 'element 1: kind "stop" is not known; known are "angle_filter", "biprism", '),
         (one("lens", z="true", focal_length='"5 mm"'), r"element 1 \(lens\): z is true: a length needs a unit"),
-        (one("mask", pattern="[[0, 1]]"), r'give its width in metres, e.g. width = "30 mm"'),
+        (one("mask", pattern="[[0, 1]]"), r'give its width, e.g. width = "30 mm"'),
         (
             mask('"circle"'),
             r'there is no file "circle" in .*; a pattern is written by name: \{ name = "circle"',

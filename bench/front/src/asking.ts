@@ -62,7 +62,7 @@ export class AskingView extends Part {
   /** An answer that is open follows the camera, when it rests. */
   private readonly keepAnswer = () => {
     const { underway } = this;
-    if (underway && (this.bench.answers.get(underway.what) !== underway.before || this.bench.refused || !this.bench.open)) {
+    if (underway && (this.bench.answers.get(underway.what) !== underway.before || this.bench.refused.length || !this.bench.open)) {
       this.underway = null;
       if (this.askNext) this.askAgain();
     }

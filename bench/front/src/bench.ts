@@ -15,6 +15,13 @@ export interface Shown {
   about: PictureMessage;
 }
 
+interface Refused {
+  words: string;
+  where: Where | null;
+}
+/** One list for all times without any: views that show it are not drawn again. */
+const NOTHING: Refused[] = [];
+
 /** What the host answered to a question, and its pictures by their addresses. */
 export interface Answered<What extends Answer["what"] = Answer["what"]> {
   message: Extract<Answer, { what: What }>;
@@ -66,7 +73,8 @@ export class Bench extends EventTarget {
   views: [number, number] | null = null;
   /** Why there is no picture. */
   without: string | null = null;
-  refused: { words: string; where: Where | null } | null = null;
+  /** What was refused since something was asked; several changes at once where a connection came back. */
+  refused: Refused[] = NOTHING;
   /** What the host did besides, or in another way. */
   remark: string | null = null;
   /** Centres of the light field's bands, metres, if it has them. */
@@ -95,6 +103,8 @@ export class Bench extends EventTarget {
   private selectThen: Selected = "sensor";
   private accepted: BenchDocument | null = null;
   next: { where: Where; value: Value } | null = null;
+  /** Values that were changed, by the turn of their message, until the host has answered: a lost connection loses none. */
+  private unanswered: { turn: number; where: Where; value: Value }[] = [];
   /** The newest turn whose state has come; those after it are under way. */
   private heard = 0;
   private timer = 0;
@@ -142,6 +152,8 @@ export class Bench extends EventTarget {
       this.next = this.remark = null;
       this.settle();
       this.ask({ do: "set", where, value, moving: false });
+      const within = (each: Where) => where.every((step, at) => each[at] === step);
+      this.unanswered = [...this.unanswered.filter((each) => !within(each.where)), { turn: this.turn, where, value }];
     }
     this.changed();
   }
@@ -180,7 +192,7 @@ export class Bench extends EventTarget {
   /** Whether the host hears what is asked now, or later; otherwise this is said. */
   private heardOf(): boolean {
     const heard = this.open || this.silent;
-    if (!heard) this.refused = { words: "This was not done, because there is no connection. Values that you change meanwhile are sent when it is back.", where: null };
+    if (!heard) this.refuse("This was not done, because there is no connection. Values that you change meanwhile are sent when it is back.");
     this.changed();
     return heard;
   }
@@ -255,8 +267,13 @@ export class Bench extends EventTarget {
   }
 
   forgive(): void {
-    this.refused = this.remark = null;
+    this.refused = NOTHING;
+    this.remark = null;
     this.changed();
+  }
+
+  private refuse(words: string, where: Where | null = null): void {
+    this.refused = [...this.refused, { words, where }];
   }
 
   // --- what can be asked of the document ---
@@ -306,9 +323,10 @@ export class Bench extends EventTarget {
     this.settle();
     this.valueUnderway = false;
     if (this.open) {
-      const document = this.document ?? (this.options.address ? await this.inAddress() : null);
-      this.ask({ do: "hello", ...(document instanceof Error ? {} : { document }) });
-      if (document instanceof Error) this.refused = { words: document.message, where: null };
+      const document = this.accepted ?? (this.options.address ? await this.inAddress() : null);
+      this.ask({ do: "hello", ...(document instanceof Error ? {} : { document, changes: this.unanswered }) });
+      for (const each of this.unanswered) each.turn = this.turn;
+      if (document instanceof Error) this.refuse(document.message);
       if (JSON.stringify(this.look) !== PLAIN) this.host.send({ do: "look", look: this.look, turn: this.turn });
     } else {
       this.progress = null;
@@ -334,7 +352,7 @@ export class Bench extends EventTarget {
         this.finished();
         break;
       case "failed":
-        this.refused = { words: message.words, where: null };
+        this.refuse(message.words);
         this.decoding = false;
         this.finished();
         break;
@@ -379,6 +397,7 @@ export class Bench extends EventTarget {
     this.canUndo = message.undo;
     this.canRedo = message.redo;
     this.accepted = message.document ?? this.accepted;
+    if (message.document) this.unanswered = this.unanswered.filter((each) => each.turn > message.turn);
     if (message.document && message.turn >= this.turn && !this.next) {
       this.document = message.document;
       this.keepAddress();
@@ -404,7 +423,7 @@ export class Bench extends EventTarget {
       }, REMARK);
       return;
     }
-    this.refused = { words: message.words, where: (message.where as Where | null) ?? null };
+    this.refuse(message.words, message.where as Where | null);
     this.decoding = false;
     this.selectAt = Infinity;
     this.valueUnderway = false;
@@ -489,7 +508,7 @@ export class Bench extends EventTarget {
 
   private ask(message: object, buffers?: ArrayBuffer[]): void {
     this.turn += 1;
-    this.refused = null;
+    this.refused = NOTHING;
     this.waiting = this.open;
     this.host.send({ ...message, turn: this.turn }, buffers);
   }
@@ -514,7 +533,7 @@ export class Bench extends EventTarget {
 
   private readonly addressChanged = async (): Promise<void> => {
     const document = await this.inAddress();
-    if (document instanceof Error) this.refused = { words: document.message, where: null };
+    if (document instanceof Error) this.refuse(document.message);
     else if (document) this.act({ do: "load", document });
     this.changed();
   };

@@ -35,7 +35,7 @@ function field(bench: Bench, parameter: Parameter, value: Value, where: Where): 
 /** A label, what it is of, and what the host said of it when it was refused. */
 function row(bench: Bench, parameter: Parameter, where: Where, inside: TemplateResult): TemplateResult {
   const id = where.join("-");
-  const wrong = bench.refused?.where?.join("-") === id ? bench.refused.words : null;
+  const wrong = bench.refused.find((each) => each.where?.join("-") === id)?.words;
   return html`<div class="field">
     <label for=${id} title=${parameter.words}>${parameter.name.replaceAll("_", " ")}</label>
     ${inside}

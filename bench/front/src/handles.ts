@@ -1,10 +1,10 @@
 /** Handles of what is selected: points of the drawing that change a parameter when they are dragged. */
 
-import { svg } from "lit";
+import { nothing, svg } from "lit";
 
 import type { Bench } from "./bench";
 import type { Mapping } from "./frame";
-import { inMillimetres, short } from "./numbers";
+import { inMillimetres, plain, short } from "./numbers";
 import type { Handle, Value, Where } from "./protocol";
 
 /** Lengths that are dragged stay at or above this, metres. */
@@ -45,7 +45,7 @@ export function valueAt(held: Held, x: number, y: number, scale: Mapping): { val
 
 /** A number of a handle, kept where it makes sense and rounded as a hand can place it. */
 export function asValue(handle: Handle, wanted: number): { value: number; words: Value } {
-  const sized = handle.words !== "decentre" && handle.unit === "length";
+  const sized = handle.words !== "decentre" && handle.unit !== "angle";
   const sign = handle.value < 0 ? -1 : 1;
   let value = sized && sign * wanted < LEAST ? sign * LEAST : wanted;
   value = Number(value.toPrecision(4));
@@ -58,8 +58,17 @@ export function asValue(handle: Handle, wanted: number): { value: number; words:
 }
 
 export function inWords(handle: Handle): string {
+  if (handle.unit === "slope") return `${handle.words} ±${plain(handle.value / 2, 3)}, ${plain((Math.atan(handle.value / 2) * 180) / Math.PI, 3)}°`;
   const value = handle.unit === "angle" ? `${Number(((handle.value * 180) / Math.PI).toPrecision(4))}°` : short(handle.value, 4);
   return `${handle.words} ${value}`;
+}
+
+/** The cone of the directions within a slope, from its handle to the part and to the other side. */
+export function drawnCone(bench: Bench, handle: Handle, scale: Mapping) {
+  if (handle.unit !== "slope") return nothing;
+  const [z, middle] = [bench.placeOf(bench.selected), bench.partOf(bench.selected)!.decentre];
+  const [x, y] = [scale.x(z + handle.z), scale.y(handle.height)];
+  return svg`<path class="cone" d="M${x} ${y}L${scale.x(z)} ${scale.y(middle)}L${x} ${scale.y(2 * middle - handle.height)}"></path>`;
 }
 
 const SIGNS: { [words: string]: string } = { "focal length": "F", rotation: "↻" };

@@ -85,7 +85,7 @@ export interface Handle {
   where: string[];
   /** Its name. */
   words: string;
-  /** Now; as a length in metres, or an angle in radians. */
+  /** Now; as a length in metres, an angle in radians, or the extent of slopes, both signs together. */
   value: number;
   /** Where the handle stands, relative to the element. */
   z: number;
@@ -96,7 +96,7 @@ export interface Handle {
   /** The direction in which it is dragged. */
   along: "z" | "height";
   /** Of the value. */
-  unit: "length" | "angle";
+  unit: "length" | "angle" | "slope";
   /** Place in a list of two, if the parameter may be a list. */
   pair: number | null;
   /** The other value of that list. */

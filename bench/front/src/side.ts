@@ -4,7 +4,7 @@ import { html, svg, css, nothing } from "lit";
 
 import type { Selected } from "./bench";
 import { Frame, MARGIN, type Mapping } from "./frame";
-import { asValue, drawnHandle, handlesOf, inWords, placeOf, valueAt, type Held } from "./handles";
+import { asValue, drawnCone, drawnHandle, handlesOf, inWords, placeOf, valueAt, type Held } from "./handles";
 import { drawnDistances, drawnLabels } from "./labels";
 import { axisStep, inMillimetres, short } from "./numbers";
 import { Part, controls } from "./part";
@@ -442,7 +442,7 @@ export class SideView extends Part {
     const now = this.held && active ? { ...handle, value: this.held.value } : handle;
     return svg`<g class="knob ${active ? "active" : ""}" data-handle=${handle.words} tabindex="0" role="slider" aria-label="${handle.words} of ${label}"
         aria-valuenow=${now.value} aria-valuetext=${inWords(now)} @keydown=${(event: KeyboardEvent) => this.keyOfHandle(event, handle)} @blur=${() => this.keysDone()}>
-      ${drawnHandle(now, x, y, active)}</g>`;
+      ${drawnCone(this.bench, handle, scale)}${drawnHandle(now, x, y, active)}</g>`;
   }
 
   private drawSnap(scale: Scale) {
@@ -555,6 +555,7 @@ export class SideView extends Part {
       .aperture.hover .borders { stroke: var(--ink); } .aperture.hover .handle { fill: var(--ink); }
       .aperture.selected .borders { stroke: var(--accent); } .aperture.selected .handle { fill: var(--accent); }
       .knob circle, .knob path { fill: var(--well); stroke: var(--accent); stroke-width: 1.8; cursor: move; }
+      .knob path.cone { fill: none; stroke-width: 1; stroke-dasharray: 4 3; pointer-events: none; }
       .knob.active circle, .knob.active path, .knob:focus-visible circle, .knob:focus-visible path { fill: var(--accent); }
       .knob .sign { font-size: 9.5px; font-weight: 700; fill: var(--accent); pointer-events: none; }
       .knob.active .sign, .knob:focus-visible .sign { fill: var(--well); }

@@ -81,7 +81,7 @@ export class BenchView extends Part {
     const { progress, refused, remark } = bench;
     const close = html`<button @click=${() => bench.forgive()}>Close</button>`;
     return html`
-      ${refused && !this.saidAtField(refused.where) ? html`<div class="toast error"><span>${refused.words}</span>${close}</div>` : nothing}
+      ${refused.filter((each) => !this.saidAtField(each.where)).map((each) => html`<div class="toast error"><span>${each.words}</span>${close}</div>`)}
       ${remark ? html`<div class="toast"><span>${remark}</span>${close}</div>` : nothing}
       ${progress ? html`<div class="toast"><span>${progress.words}</span><progress aria-label=${progress.words} max=${progress.total} value=${progress.done}></progress></div>` : nothing}`;
   }

@@ -29,6 +29,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import spread
+from vcc.bench.page_words import page_words
 from vcc.bench.picture import Taken
 from vcc.bench.screen import Picture, jpeg, white_of
 from vcc.bench.side import scene_distances
@@ -123,7 +124,7 @@ class Decoding:
         except InputError as error:
             if message["what"] == "refocused":
                 raise
-            return {"why": str(error)}, []
+            return {"why": page_words(str(error))}, []
         with asked.turn() as progress:
             picture = _refocused(decoded, distance, progress)
         if message["what"] == "refocused":

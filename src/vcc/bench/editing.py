@@ -77,13 +77,10 @@ class Editing:
             return None
         return self.document.coloured(field.whole()).grid.moved(self.document.aperture.rays)
 
-    def greet(self, given: Any, again: bool) -> None:
-        """Start with the document that a client sends; a client that reconnects adds it to its history."""
+    def greet(self, given: Any) -> None:
+        """Start with the document that a client sends."""
         document, self.described = self.checked(Document.of_json(given))
-        if again:
-            self.history.put(document)
-        else:
-            self.history = History(document)
+        self.history = History(document)
 
     def checked(self, document: Document) -> tuple[Document, TrainAsWritten]:
         """The document with its sensor's place as a length, and the camera; both are valid."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import math
 import zipfile
 from dataclasses import dataclass
 from typing import Any
@@ -21,9 +22,7 @@ from vcc.bench.picture import Taken
 from vcc.files.camera_families import FAMILIES, needed, parameters_of, unit_of
 from vcc.files.camera_reading import Beside
 from vcc.files.camera_writing import NOWHERE, tables_of_train
-from vcc.optics import Element
-from vcc.optics.electronics import Electronics
-from vcc.optics.sensor import Sensor
+from vcc.optics.prescription import Prescription, Surface
 from vcc.optics.train import Train
 
 KINDS = ("toml", "python", "png", "exr")
@@ -196,7 +195,7 @@ class _Writer:
             value = value.item()
         if dataclasses.is_dataclass(value) and not isinstance(value, type):
             return self.made(value)
-        if isinstance(value, float) and unit in _UNITS:
+        if isinstance(value, float) and unit in _UNITS and math.isfinite(value):
             return self.quantity(value, unit)
         if value is None or isinstance(value, bool | int | float | str):
             return _number(value) if isinstance(value, float) else repr(value)
@@ -230,7 +229,9 @@ def _number(value: float) -> str:
 
 def _module_of(thing: Any) -> str:
     """The public module that exports the object's class."""
-    if isinstance(thing, Element | Sensor | Electronics):
-        return "vcc"
     family = next((each for each in FAMILIES if isinstance(thing, each.base)), None)
-    return family.module if family is not None else "vcc.patterns"
+    if family is not None:
+        return family.module
+    if isinstance(thing, Prescription | Surface):
+        return "vcc.prescriptions"
+    return "vcc" if type(thing).__module__.startswith("vcc.optics.") else "vcc.patterns"

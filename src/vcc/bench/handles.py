@@ -6,12 +6,14 @@ import math
 from typing import Any
 
 from vcc.bench.messages import Handle
-from vcc.optics import Element
+from vcc.optics import AngleFilter, Element
 from vcc.optics.sensor import Sensor
 from vcc.plot.elements import half_size
 
 FAR = 1.0
 """Metres from the axis, beyond any drawing: handles stand at its border."""
+BEFORE = 0.01
+"""Metres before an angle filter in the entrance plane, or before it, at which its steepest ray has a handle."""
 QUARTER = math.pi / 2
 """Rotation, radians, for a drag over half the height of an element."""
 
@@ -26,7 +28,12 @@ def handles_of(element: Element, axis: int) -> list[Handle]:
     centre, half = element.decentre[axis], half_size(element, axis)
     found = [_across(element.decentre, axis)]
     size = _size(element, axis)
-    if size is not None:
+    if size is not None and isinstance(element, AngleFilter):
+        # 1 m of its pattern is a slope of 1: the handle is on the steepest ray, at the entrance plane.
+        (where, value), away = size, element.z if element.z > 0 else BEFORE
+        edge = centre + away * value / 2
+        found.append(_handle(where, "steepest slope", value, -away, edge, 2 / away, unit="slope"))
+    elif size is not None:
         where, value = size
         found.append(_handle(where, " ".join(where).replace("_", " "), value, 0.0, centre + value / 2, 2.0))
     focal_length = getattr(element, "focal_length", None)

@@ -118,7 +118,7 @@ class Handle(TypedDict):
     Args:
         where: the parameter, in the element's table.
         words: its name.
-        value: now; as a length in metres, or an angle in radians.
+        value: now; as a length in metres, an angle in radians, or the extent of slopes, both signs together.
         z: where the handle stands, relative to the element.
         height: likewise, from the axis.
         rate: change of the value for each metre that the handle is dragged along ``along``.
@@ -135,7 +135,7 @@ class Handle(TypedDict):
     height: float
     rate: float
     along: Literal["z", "height"]
-    unit: Literal["length", "angle"]
+    unit: Literal["length", "angle", "slope"]
     pair: int | None
     other: float | None
 

@@ -319,8 +319,8 @@ def listening(host: str, port: int) -> socket.socket:
 
 def run(
     offered: Offered, *, host: str = LOOPBACK, port: int = 0, browser: bool = True, say: Callable[[str], None]
-) -> None:
-    """Serve a bench until Ctrl-C, which is its ordinary end.
+) -> bool:
+    """Serve a bench until Ctrl-C, which is its ordinary end; return whether it ended so.
 
     Args:
         offered: the light fields, cameras and files of the bench.
@@ -349,35 +349,22 @@ def run(
             timeout_graceful_shutdown=0,
             limit_concurrency=8 * MOST_CLIENTS,
         )
-        server = _server(uvicorn, config)
+        server = uvicorn.Server(config)
+        server.capture_signals = contextlib.nullcontext  # uvicorn's own raise the signal again at the end
+
+        def end(*_: Any) -> None:
+            server.should_exit = server.force_exit = True  # at once, with clients connected
+
+        for each in (signal.SIGINT, signal.SIGTERM):  # for good: a second Ctrl-C interrupts nothing
+            signal.signal(each, end)
         sys.setswitchinterval(SWITCH)
         say(f"The bench is at {address} (Ctrl-C ends it)")
         if browser:
             threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
         server.run(sockets=[made])
-    if server.interrupted:
+    if server.force_exit:
         say("The bench has ended.")
-
-
-def _server(uvicorn: Any, config: Any) -> Any:
-    """A uvicorn server that stops at the first Ctrl-C, even with clients connected."""
-
-    class Server(uvicorn.Server):  # type: ignore[misc]
-        interrupted = False
-
-        @contextlib.contextmanager
-        def capture_signals(self) -> Any:
-            def end(*_: Any) -> None:
-                self.interrupted, self.should_exit, self.force_exit = True, True, True
-
-            before = {each: signal.signal(each, end) for each in (signal.SIGINT, signal.SIGTERM)}
-            try:
-                yield
-            finally:
-                for each, handler in before.items():
-                    signal.signal(each, handler)
-
-    return Server(config)
+    return bool(server.force_exit)
 
 
 def address_of(door: Door, port: int) -> str:

@@ -29,6 +29,7 @@ from vcc.bench.imaging import Imaging, Wanted
 from vcc.bench.inbox import CHANGES, Inbox, turn_of
 from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
+from vcc.bench.page_words import page_words
 from vcc.bench.picture import FULL, WHOLE, Taken
 from vcc.bench.pins import Pins
 from vcc.bench.screen import Look
@@ -199,6 +200,8 @@ class Session:
         return self._inbox.take()
 
     def _tell(self, kind: str, message: Mapping[str, Any], buffers: Sequence[bytes] = ()) -> None:
+        if kind in ("refused", "no picture"):
+            message = {**message, "words": page_words(message["words"])}
         send = self._send
         if send is not None and not self._closed:
             send({"is": kind, **message}, buffers)
@@ -250,15 +253,30 @@ class Session:
             },
             [thumbnail for *_, thumbnail in presets.values()],
         )
-        if message.get("document") is not None:
-            try:
-                self._editing.greet(message["document"], self._greeted)
-            except InputError as error:
-                self._refuse(message, error)
+        try:
+            if message.get("document") is not None and not self._greeted:
+                self._editing.greet(message["document"])
+            self._catch_up(message)
+        except InputError as error:
+            self._refuse(message, error)
         self._greeted = True
         self._tell_state(turn_of(message))
         self._tell_pins()
         self._wanted = Wanted(turn_of(message), moving=False)
+
+    def _catch_up(self, message: Json) -> None:
+        """Make the changes of values during a lost connection; what is refused of them leaves the others."""
+        changes = message.get("changes", [])
+        if not isinstance(changes, list) or not all(isinstance(each, dict) for each in changes):
+            raise InputError("changes is a list of tables of where and value")
+        for each in changes:
+            try:
+                remark = self._editing.set({"where": each.get("where"), "value": each.get("value")})
+            except InputError as error:
+                self._refuse(message | {"where": each.get("where")}, error)
+                continue
+            if remark is not None:
+                self._remark("set", remark, turn_of(message))
 
     def _do_set(self, message: Json) -> None:
         moving, rests = bool(message.get("moving", False)), bool(message.get("rests", False))

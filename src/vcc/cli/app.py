@@ -277,13 +277,17 @@ def main() -> None:
     """Run the command line with the arguments of this process, and end it with an exit code.
 
     0: done. 1: a bug, with a traceback. 2: invalid input, with a message on standard error. 130: interrupted
-    by Ctrl-C.
+    by Ctrl-C; a server that Ctrl-C ends, as it should, exits with 0.
     """
+    stopped = True
     try:
         code = run(sys.argv[1:])
+        stopped = code == INTERRUPTED
     except KeyboardInterrupt:  # a second Ctrl-C while the first was handled
         code = INTERRUPTED
-    if code == INTERRUPTED and threading.active_count() > 1:
+    except SystemExit:  # a server that was ended
+        code = 0
+    if stopped and threading.active_count() > 1:
         # The work of other threads is no longer needed, and Python would wait for it.
         sys.stdout.flush()
         sys.stderr.flush()

@@ -1,5 +1,6 @@
 """``vcc bench``: the optical bench in a browser."""
 
+import contextlib
 import dataclasses
 import threading
 from pathlib import Path
@@ -88,7 +89,8 @@ def bench(
     offered = Offered(fields, start, beside, shown, presets(shown))
     # Opens while the browser starts; a client that is faster waits for the same lock.
     threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
-    run(offered, host=host, port=port, browser=not no_browser, say=show)
+    if run(offered, host=host, port=port, browser=not no_browser, say=show):
+        raise SystemExit  # by Ctrl-C, without waiting for what other threads compute
 
 
 def _document(camera: Path, light_field: str) -> tuple[Document, Beside]:
@@ -124,10 +126,5 @@ def _splats(path: Path, standing: Standing, train: Train) -> tuple[Field, float]
 
 
 def _opened(field: Field) -> None:
-    try:
+    with contextlib.suppress(Exception):  # a client that needs it opens it again, and gets the error
         field.whole()
-    except InputError:
-        return  # the client gets the message
-    except RuntimeError:  # else the program ends, and pools of threads with it
-        if threading.main_thread().is_alive():
-            raise

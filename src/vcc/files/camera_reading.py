@@ -435,6 +435,8 @@ def _read_list(given: Any, hints: tuple[Any, ...], unit: str | None, what: str, 
             "length": '"1 mm"',
             "angle": '"1 deg"',
             "time": '"1 ms"',
+            "area": '"1 um2"',
+            "area squared": '"1 um4"',
         }[unit]
         if str in alternatives(hints[0]):
             example = '"…"'

@@ -11,6 +11,8 @@ LONGEST_SHOWN = 60
 
 _TRUTH = re.compile(r"\b([a-z]\w*)=(True|False)\b")
 _QUANTITY = re.compile(r"\b([a-z]\w*)=(-?[\d.]+(?:e[-+]?\d+)?) \* ([a-z]+)\b")
+_BARE = re.compile(r"(?<![\w=.*])(-?\d[\d.]*(?:e[-+]?\d+)?) \* ([a-z]+)\b")
+_SI = re.compile(r",? in (?:metres|radians|seconds)\b")
 _PAIRS = re.compile(r"\b([a-z]\w*)=(\([()\d.,e+\- ]*\))")
 _NUMBER = re.compile(r"\b([a-z]\w*)=(-?\d[\d.]*(?:e[-+]?\d+)?)(?![\w*])")
 
@@ -28,11 +30,15 @@ def in_toml(value: Any) -> str:
 def as_toml(message: str) -> str:
     """Convert a message of the library to TOML syntax: ``normalise=True`` becomes ``normalise = true``.
 
+    Quantities in TOML carry their units: "in metres" is left out.
+
     Args:
-        message: a message with Python arguments: ``width=30 * mm``, ``pitch=1e-3``, ``offset=(0, 1)``.
+        message: a message with Python arguments: ``width=30 * mm``, ``pitch=1e-3``, ``offset=(0, 1)``, or
+            quantities: ``550 * nm``.
     """
     message = _TRUTH.sub(lambda found: f"{found[1]} = {found[2].lower()}", message)
     message = _QUANTITY.sub(r'\1 = "\2 \3"', message)
+    message = _SI.sub("", _BARE.sub(r'"\1 \2"', message))
     message = _PAIRS.sub(lambda found: f"{found[1]} = {found[2].replace('(', '[').replace(')', ']')}", message)
     return _NUMBER.sub(r"\1 = \2", message)
 
