@@ -12,7 +12,6 @@ from vcc.bench.editing import Editing
 from vcc.files.camera_families import ELEMENT_KINDS
 from vcc.prescriptions import built_in_lenses
 
-SOURCE = "from tests.bench.on_bench import noise\n\nlight_field = noise()"
 KINDS = [kind for kind in ELEMENT_KINDS if kind not in additions.FROM_FILES]
 
 
@@ -68,10 +67,9 @@ def test_each_element_of_the_menu_is_added_and_dragged_and_its_file_and_program_
     assert added.z == 0.14
     if name in built_in_lenses():
         assert added.prescription == vcc.load_lens(name, model="real").prescription
-    there = export.OnBench(editing.document, editing.train, SOURCE, editing.offered.beside)
     monkeypatch.chdir(tmp_path)
     for what in ("toml", "python"):
-        file, _, data = export.exported(what, there, None, 1.0)
+        file, _, data = export.exported(what, editing, None, 1.0)
         (tmp_path / file).write_bytes(data)
         if file.endswith(".zip"):
             zipfile.ZipFile(file).extractall()

@@ -269,7 +269,9 @@ def test_a_client_whose_connection_broke_comes_back_to_its_steps_and_its_pinned_
             refused = told(again, "refused")[0]
             assert (refused["where"], refused["turn"]) == (["sensor", "pitch"], 3)
             assert told(again, "state")[0]["undo"]
-            assert told(again, "pins") == pinned
+            there = told(again, "pins")
+            assert (there[0]["pins"], there[1]) == (pinned[0]["pins"], pinned[1])
+            assert (pinned[0]["same"], there[0]["psnr"]) == (True, compared)
             again.send(packed({"do": "undo", "turn": 4}))
             state, picture = at_rest(again)
             assert (state["document"]["camera"]["sensor"]["z"], picture["psnr"]) == ("54 mm", compared)

@@ -83,9 +83,10 @@ class Bench:
         self.settle()
 
     def settle(self) -> None:
-        """Wait for the whole picture and its notes."""
+        """Wait for the whole picture and its notes. Its time is that of this machine, and not shown."""
         self.page.wait_for_selector('section.picture[aria-busy="false"]')
         self.page.wait_for_timeout(700)
+        self.page.locator("vcc-bench-picture .line > span:last-child").evaluate("it => it.style.opacity = 0")
 
     def drag(self, to: str) -> None:
         """Take hold of the sensor and move it to where something is sharp, without letting go."""

@@ -4,7 +4,7 @@ import { html, svg, css, nothing } from "lit";
 
 import type { Answered } from "./bench";
 import { plain, short } from "./numbers";
-import { MARGIN, plotted } from "./plots";
+import { MARGIN, plotted, ticks } from "./plots";
 import type { Plane } from "./protocol";
 
 /** What can be asked, and how its tab is called. */
@@ -60,21 +60,13 @@ function drawnInFrame(plane: Plane, frame: { place: [number, number]; slope: [nu
     <rect class="ground" x=${left} y=${top} width=${right - left} height=${bottom - top}></rect>
     <image href=${picture} preserveAspectRatio="none" x=${x(plane.place[0])} y=${y(plane.slope[1])}
       width=${x(plane.place[1]) - x(plane.place[0])} height=${y(plane.slope[0]) - y(plane.slope[1])}></image>
-    ${round(frame.place[0] * scale.of, frame.place[1] * scale.of).map((each) => svg`<path class="grid" d="M${x(each / scale.of)} ${bottom}v4"></path>
+    ${ticks(frame.place[0] * scale.of, frame.place[1] * scale.of, 6).map((each) => svg`<path class="grid" d="M${x(each / scale.of)} ${bottom}v4"></path>
       <text x=${x(each / scale.of)} y=${bottom + 16} text-anchor="middle">${plain(each, 3)}</text>`)}
-    ${round(...frame.slope).map((each) => svg`<path class="grid" d="M${left} ${y(each)}h-4"></path>
+    ${ticks(...frame.slope, 6).map((each) => svg`<path class="grid" d="M${left} ${y(each)}h-4"></path>
       <text x=${left - 6} y=${y(each) + 4} text-anchor="end">${plain(each, 3)}</text>`)}
     <text x=${(left + right) / 2} y=${high - 5} text-anchor="middle">place across the plane, ${scale.unit}</text>
     <text transform="translate(11 ${(top + bottom) / 2}) rotate(-90)" text-anchor="middle">slope</text></svg>
     <figcaption>${plane.title}</figcaption></figure>`;
-}
-
-/** Some round numbers between two. */
-function round(least: number, greatest: number): number[] {
-  const power = 10 ** Math.floor(Math.log10(greatest - least));
-  const step = [0.2, 0.5, 1, 2].map((each) => each * power).find((each) => (greatest - least) / each <= 6)!;
-  const first = Math.ceil(least / step - 1e-9);
-  return Array.from({ length: Math.floor(greatest / step + 1e-9) - first + 1 }, (_, number) => (first + number) * step);
 }
 
 /** Contrast over frequency; both curves end where the longer one does. */

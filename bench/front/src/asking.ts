@@ -3,7 +3,6 @@
 import { html, css, nothing } from "lit";
 
 import { OF_A_POINT, OF_PLANES, QUESTIONS, answerStyles, drawnAnswer } from "./answers";
-import type { Answered } from "./bench";
 import { DecodedView, foldsViews } from "./decoded";
 import { EditorView } from "./editor";
 import { inMillimetres, metres, withUnit } from "./numbers";
@@ -18,9 +17,6 @@ export class AskingView extends Part {
   private distance = "";
   /** Of phase space; empty for each plane of the camera. */
   private plane = "";
-  /** While an answer is under way nothing else is asked; the newest question is asked when it has come. */
-  private underway: { what: string; before: Answered | undefined } | null = null;
-  private askNext = false;
   private askedFor = "";
   private askTimer = 0;
 
@@ -61,11 +57,6 @@ export class AskingView extends Part {
 
   /** An answer that is open follows the camera, when it rests. */
   private readonly keepAnswer = () => {
-    const { underway } = this;
-    if (underway && (this.bench.answers.get(underway.what) !== underway.before || this.bench.refused.length || !this.bench.open)) {
-      this.underway = null;
-      if (this.askNext) this.askAgain();
-    }
     if (this.beside === "parts" || this.beside === "notes" || !this.bench.document) return;
     const about = `${this.beside} ${this.bench.turn} ${JSON.stringify(this.bench.document)}`;
     if (about === this.askedFor) return;
@@ -85,9 +76,6 @@ export class AskingView extends Part {
       this.bench.question("decoded", distance ? { distance } : {});
       return;
     }
-    this.askNext = this.underway !== null;
-    if (this.askNext) return;
-    this.underway = { what: this.beside, before: this.bench.answers.get(this.beside) };
     const distance = this.distance.trim();
     const plane = this.plane.trim();
     if (OF_A_POINT.includes(this.beside) && distance) this.bench.question(this.beside, { distance: withUnit(distance, null, "m") });

@@ -1,6 +1,6 @@
 /** The state of one bench on this side of the wire: what the host said last, and what was asked of it since. */
 
-import { read, written } from "./address";
+import { base64, read, written } from "./address";
 import type { Host } from "./host";
 import { metres } from "./numbers";
 import type {
@@ -37,9 +37,6 @@ const TOGETHER = 50;
 const REMARK = 12_000;
 const ADDRESS_AFTER = 250;
 const LONGEST_ADDRESS = 200_000;
-
-/** Bytes that become letters at once: byte by byte a whole picture takes milliseconds. */
-const AT_ONCE = 8192;
 
 const PLAIN = JSON.stringify({ black: 0, linear: false, channel: null, photodiodes: "sum", axis: "x" });
 
@@ -113,8 +110,8 @@ export class Bench extends EventTarget {
   private restTimer = 0;
   private pictures = 0;
   private latestPicture = 0;
-  private valueUnderway = false;
-  private nextValue: [number, number] | null = null;
+  /** Questions under way, each with the newest that was asked meanwhile. */
+  private readonly asked = new Map<string, object | null>();
 
   constructor(private readonly host: Host, readonly options: Options = {}) {
     super();
@@ -211,18 +208,22 @@ export class Bench extends EventTarget {
     this.selectAt = this.turn;
   }
 
-  /** The pixel's numbers; the newest asked for, when those of the one before have come. */
-  askValue(x: number, y: number): void {
-    this.nextValue = [x, y];
-    if (this.valueUnderway) return;
-    this.valueUnderway = true;
-    this.host.send({ do: "value", x, y });
-    this.nextValue = null;
+  /** Ask about the camera or a pixel ("value"); while an answer is under way, the newest question waits for it. */
+  question(what: string, options: object = {}): void {
+    const waits = this.asked.has(what);
+    this.asked.set(what, waits ? options : null);
+    if (waits) return;
+    if (what === "decoded") this.decoding = true;
+    this.host.send(what === "value" ? { do: what, ...options } : { do: "ask", what, ...options });
   }
 
-  question(what: string, options: object = {}): void {
-    if (what === "decoded") this.decoding = true;
-    this.host.send({ do: "ask", what, ...options });
+  /** Questions that are answered, or will not be, are followed by those that wait for them. */
+  private answered(...all: string[]): void {
+    for (const what of all) {
+      const next = this.asked.get(what);
+      this.asked.delete(what);
+      if (next) this.question(what, next);
+    }
   }
 
   export(what: string, options: object = {}): void {
@@ -321,7 +322,7 @@ export class Bench extends EventTarget {
       return;
     }
     this.settle();
-    this.valueUnderway = false;
+    this.asked.clear();
     if (this.open) {
       const document = this.accepted ?? (this.options.address ? await this.inAddress() : null);
       this.ask({ do: "hello", ...(document instanceof Error ? {} : { document, changes: this.unanswered }) });
@@ -354,6 +355,7 @@ export class Bench extends EventTarget {
       case "failed":
         this.refuse(message.words);
         this.decoding = false;
+        this.answered(...this.asked.keys());
         this.finished();
         break;
       case "picture":
@@ -363,12 +365,11 @@ export class Bench extends EventTarget {
         await this.showPicture(message, buffers[0]);
         break;
       case "pins":
-        await this.hearPins(message.pins, buffers);
+        await this.hearPins(message, buffers);
         break;
       case "value":
         this.value = message;
-        this.valueUnderway = false;
-        if (this.nextValue) this.askValue(...this.nextValue);
+        this.answered("value");
         break;
       case "answer":
         await this.hearAnswer(message, buffers);
@@ -426,7 +427,7 @@ export class Bench extends EventTarget {
     this.refuse(message.words, message.where as Where | null);
     this.decoding = false;
     this.selectAt = Infinity;
-    this.valueUnderway = false;
+    this.answered(...this.asked.keys());
     if (!this.next && message.turn >= this.turn) this.document = this.accepted; // the host's state follows
     this.finished();
   }
@@ -439,24 +440,16 @@ export class Bench extends EventTarget {
     this.sendNext();
   }
 
-  private async hearPins(pins: Pin[], buffers: DataView[]): Promise<void> {
+  private async hearPins({ pins, psnr, same }: Extract<FromHost, { is: "pins" }>, buffers: DataView[]): Promise<void> {
     this.pins = pins.map((about, number) => ({ about, thumbnail: dataAddress(buffers[number]!) }));
     const bitmap = buffers[pins.length] ? await decoded(buffers[pins.length]!) : null;
     this.pinned?.close();
     this.pinned = bitmap;
-    if (!bitmap && this.picture) this.picture.about = { ...this.picture.about, psnr: null, same: false };
-    else if (this.picture && pins.at(-1)?.compared && pins.at(-1)?.same && !this.waiting && this.fresh(pins))
-      this.picture.about = { ...this.picture.about, psnr: null, same: true };
-    this.pinCount = pins.length;
+    if (this.picture) this.picture.about = { ...this.picture.about, psnr, same };
   }
-
-  /** Whether a state was pinned just now: its picture is the one that is shown. */
-  private fresh(pins: Pin[]): boolean {
-    return pins.length > this.pinCount;
-  }
-  private pinCount = 0;
 
   private async hearAnswer(message: Answer, buffers: DataView[]): Promise<void> {
+    this.answered(message.what);
     if (message.what === "scrub") {
       this.progress = null;
       this.frames = { values: message.values, label: message.label, bitmaps: await Promise.all(buffers.map(decoded)) };
@@ -508,6 +501,7 @@ export class Bench extends EventTarget {
 
   private ask(message: object, buffers?: ArrayBuffer[]): void {
     this.turn += 1;
+    this.asked.clear(); // the host gives up what a change makes obsolete
     this.refused = NOTHING;
     this.waiting = this.open;
     this.host.send({ ...message, turn: this.turn }, buffers);
@@ -570,9 +564,7 @@ function bytesOf(view: DataView): Uint8Array<ArrayBuffer> {
 /** A picture's address that any page may show, whatever its policy says of those made in it. */
 function dataAddress(view: DataView): string {
   const bytes = bytesOf(view);
-  let letters = "";
-  for (let at = 0; at < bytes.length; at += AT_ONCE) letters += String.fromCharCode(...bytes.subarray(at, at + AT_ONCE));
-  return `data:image/${bytes[0] === 0xff ? "jpeg" : "webp"};base64,${btoa(letters)}`;
+  return `data:image/${bytes[0] === 0xff ? "jpeg" : "webp"};base64,${base64(bytes)}`;
 }
 
 /** By an image of a data address: a Blob is registered in the browser's own process, for which the page waits. */

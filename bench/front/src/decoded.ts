@@ -22,9 +22,6 @@ export class DecodedView extends Part {
   static override properties = { ...Part.properties, chosen: { state: true } };
   /** What the user has chosen, 1/metre; null for what the camera is focused on. */
   declare chosen: number | null;
-  /** What is refocused on and not shown yet, and what is to be after it. */
-  private underway: unknown = null;
-  private next = false;
 
   constructor() {
     super();
@@ -36,28 +33,9 @@ export class DecodedView extends Part {
     return this.chosen === null ? undefined : this.chosen > 0 ? `${1 / this.chosen} m` : "inf m";
   }
 
-  /** The newest distance is asked for when the picture of the one before has come. */
   private choose(vergence: number | null): void {
     this.chosen = vergence;
-    if (this.underway !== null && this.underway === this.shown()) this.next = true;
-    else this.ask();
-  }
-
-  private ask(): void {
-    this.next = false;
-    this.underway = this.shown();
     this.bench.question("refocused", this.distance ? { distance: this.distance } : {});
-  }
-
-  /** What changes with each answer. */
-  private shown(): unknown {
-    return this.bench.refocused ?? this.bench.decoded;
-  }
-
-  override willUpdate(): void {
-    if (this.underway === this.shown()) return;
-    this.underway = null;
-    if (this.next) this.ask();
   }
 
   override render() {

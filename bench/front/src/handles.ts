@@ -78,7 +78,7 @@ export function drawnHandle(handle: Handle, x: number, y: number, active: boolea
   const shape = handle.words === "decentre"
     ? svg`<path d="M${x} ${y - RADIUS - 1}l${RADIUS + 1} ${RADIUS + 1}l${-RADIUS - 1} ${RADIUS + 1}l${-RADIUS - 1} ${-RADIUS - 1}z"></path>`
     : svg`<circle cx=${x} cy=${y} r=${letter ? RADIUS + 2 : RADIUS}></circle>`;
-  const above = y > 110;
+  const [above, left] = [y > 110, x > 200];
   return svg`${shape}${letter ? svg`<text class="sign" x=${x} y=${y + 3.5} text-anchor="middle">${letter}</text>` : ""}
-    <text class="says ${active ? "active" : ""}" x=${x + (x > 140 ? -11 : 11)} y=${y + (above ? -9 : 17)} text-anchor=${x > 140 ? "end" : "start"}>${inWords(handle)}</text>`;
+    <text class="says ${active ? "active" : ""}" x=${x + (left ? -11 : 11)} y=${y + (above ? -9 : 17)} text-anchor=${left ? "end" : "start"}>${inWords(handle)}</text>`;
 }

@@ -240,7 +240,7 @@ export class PictureView extends Part {
   private point(pixel: Place | null): void {
     if (pixel?.x === this.at?.x && pixel?.y === this.at?.y) return;
     this.at = pixel;
-    if (pixel && this.bench.picture && !this.bench.picture.about.coarse) this.bench.askValue(pixel.x, pixel.y);
+    if (pixel && this.bench.picture && !this.bench.picture.about.coarse) this.bench.question("value", pixel);
   }
 
   private key(event: KeyboardEvent): void {
@@ -296,7 +296,7 @@ export class PictureView extends Part {
     const about = this.bench.picture?.about;
     if (about === this.asked || !about || about.coarse) return;
     this.asked = about;
-    if (this.at) this.bench.askValue(this.at.x, this.at.y);
+    if (this.at) this.bench.question("value", this.at);
     this.askProfile();
   }
 

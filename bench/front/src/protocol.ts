@@ -337,6 +337,10 @@ export interface FailedMessage {
 /** All pins; the buffers are the thumbnails, then the image of the reference. */
 export interface PinsMessage {
   pins: Pin[];
+  /** Of the image that is shown against the reference, dB. */
+  psnr: number | null;
+  /** Whether it equals that. */
+  same: boolean;
 }
 
 /** A file to save; its buffer has the bytes. */

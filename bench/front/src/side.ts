@@ -555,8 +555,8 @@ export class SideView extends Part {
       .aperture.hover .borders { stroke: var(--ink); } .aperture.hover .handle { fill: var(--ink); }
       .aperture.selected .borders { stroke: var(--accent); } .aperture.selected .handle { fill: var(--accent); }
       .knob circle, .knob path { fill: var(--well); stroke: var(--accent); stroke-width: 1.8; cursor: move; }
-      .knob path.cone { fill: none; stroke-width: 1; stroke-dasharray: 4 3; pointer-events: none; }
       .knob.active circle, .knob.active path, .knob:focus-visible circle, .knob:focus-visible path { fill: var(--accent); }
+      .knob path.cone { fill: none; stroke-width: 1; stroke-dasharray: 4 3; pointer-events: none; }
       .knob .sign { font-size: 9.5px; font-weight: 700; fill: var(--accent); pointer-events: none; }
       .knob.active .sign, .knob:focus-visible .sign { fill: var(--well); }
       .knob .says { fill: var(--accent); font-weight: 600; opacity: 0; pointer-events: none; paint-order: stroke; stroke: var(--ground); stroke-width: 4px; }

@@ -8,7 +8,7 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import MISSING, Field, is_dataclass, replace
 from pathlib import Path
@@ -201,8 +201,8 @@ def new_element(kind: Any, z: Any, train: Train, names: AbstractSet[str]) -> Jso
     table: Json = {"kind": kind, "name": free_name(str(kind).replace("_", " "), names), "z": given}
     if kind == "lens_array" and z is None:
         return table | _lenslets(train)
-    make = _NEW.get(str(kind))
-    return table | ({} if make is None else make(long, wide))
+    new: Json = _new(long, wide).get(kind, {})
+    return table | new
 
 
 def _new_real_lens(kind: str, z: Any, train: Train, names: AbstractSet[str]) -> Json:
@@ -297,38 +297,29 @@ def _length(value: float, digits: int = 3) -> str:
     return _quantity(float(f"{value:.{digits}g}"), "length")
 
 
-_NEW: Mapping[str, Callable[[float, float], Json]] = {
-    "angle_filter": lambda long, wide: {
-        "pattern": {"name": "circle", "diameter": _length(wide / long, 2)}  # 1 m for a slope of 1
-    },
-    "biprism": lambda long, wide: {"deflection": 0.01, "diameter": _length(1.2 * wide)},
-    "coded_diffuser": lambda long, wide: {
-        "kernels": [{"name": "gaussian", "sigma": 0.002}, {"name": "gaussian", "sigma": 0.01}],
-        "width": _length(1.2 * wide),
-        "weights": [[[1, 0], [0, 1]], [[0, 1], [1, 0]]],
-    },
-    "diffractive_lens": lambda long, wide: {
-        "focal_length": _length(2 * long, 2),
-        "diameter": _length(1.2 * wide, 2),
-    },
-    "diffuser": lambda long, wide: {"kernel": {"name": "gaussian", "sigma": 0.005}},
-    "first_order": lambda long, wide: {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
-    "lens": lambda long, wide: {"focal_length": _length(2 * long, 2), "diameter": _length(1.2 * wide, 2)},
-    "lens_array": lambda long, wide: {"pitch": _length(wide / 40, 2), "focal_length": _length(long / 50, 2)},
-    "louvre": lambda long, wide: {"pitch": _length(wide / 10, 2), "height": _length(long / 20, 2)},
-    "mask": lambda long, wide: {"pattern": {"name": "circle", "diameter": _length(wide / 2, 2)}},
-    "phase_plate": lambda long, wide: {
-        "surface": {"name": "cubic", "strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
-        "diameter": _length(1.2 * wide, 2),
-    },
-    "prism": lambda long, wide: {"deflection": [0.02, 0.0]},
-    "prism_array": lambda long, wide: {
-        "slopes": [[[-0.01, -0.01], [0.01, -0.01]], [[-0.01, 0.01], [0.01, 0.01]]],
-        "pitch": _length(wide / 2, 2),
-    },
-    "pyramid": lambda long, wide: {"sides": 4, "deflection": 0.01, "diameter": _length(1.2 * wide, 2)},
-}
-"""Parameters of a new element, from the length of the camera and the width of the beam there, metres."""
+def _new(long: float, wide: float) -> Json:
+    """Parameters of new elements by kind, from the camera's length and the width of the beam there, metres."""
+    rim, power = _length(1.2 * wide, 2), _length(2 * long, 2)
+    gaussians = [{"name": "gaussian", "sigma": sigma} for sigma in (0.002, 0.01)]
+    return {
+        "angle_filter": {"pattern": {"name": "circle", "diameter": _length(wide / long, 2)}},  # slopes
+        "biprism": {"deflection": 0.01, "diameter": rim},
+        "coded_diffuser": {"kernels": gaussians, "width": rim, "weights": [[[1, 0], [0, 1]], [[0, 1], [1, 0]]]},
+        "diffractive_lens": {"focal_length": power, "diameter": rim},
+        "diffuser": {"kernel": gaussians[0] | {"sigma": 0.005}},
+        "first_order": {"matrix": [[1, 0], [float(f"{-1 / (2 * long):.3g}"), 1]]},
+        "lens": {"focal_length": power, "diameter": rim},
+        "lens_array": {"pitch": _length(wide / 40, 2), "focal_length": _length(long / 50, 2)},
+        "louvre": {"pitch": _length(wide / 10, 2), "height": _length(long / 20, 2)},
+        "mask": {"pattern": {"name": "circle", "diameter": _length(wide / 2, 2)}},
+        "phase_plate": {"surface": {"name": "cubic", **_chosen(long, wide)["cubic"]}, "diameter": rim},
+        "prism": {"deflection": [0.02, 0.0]},
+        "prism_array": {
+            "slopes": [[[-0.01, -0.01], [0.01, -0.01]], [[-0.01, 0.01], [0.01, 0.01]]],
+            "pitch": _length(wide / 2, 2),
+        },
+        "pyramid": {"sides": 4, "deflection": 0.01, "diameter": rim},
+    }
 
 
 # --- chosen by name, or uploaded ---
@@ -358,9 +349,9 @@ def made_whole(
     long = max(train.sensor.z, 1e-3)
     wide = _width_at(train, train.sensor.z if number is None else described.elements[number].z)
     name = value.get("name") if isinstance(value, dict) else None
-    if isinstance(name, str) and len(value) == 1 and name in _CHOSEN:
+    if isinstance(name, str) and len(value) == 1:
         by_slope = number is None or table.get("kind") == "angle_filter"  # 1 m for a slope of 1
-        value = value | _CHOSEN[name](*((1.0, _width_at(train, 0.0) / long) if by_slope else (long, wide)))
+        value = value | _chosen(*((1.0, _width_at(train, 0.0) / long) if by_slope else (long, wide))).get(name, {})
     cells = isinstance(value, list) or name == "mura"
     if where[2:] == ["pattern"] and cells and "width" not in table and table.get("kind") == "mask":
         return [([*where[:2], "width"], _length(wide, 2)), (where, value)]
@@ -430,67 +421,42 @@ def _means(values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
 MOST_BROUGHT = 2**14
 """Cells of an uploaded image; each state message contains all of them."""
 
-_CHOSEN: Mapping[str, Callable[[float, float], Json]] = {
-    "angular_fringes": lambda long, wide: {"frequency": float(f"{12 * long / wide:.2g}")},
-    "bounded": lambda long, wide: {
-        "pattern": {"name": "cosine_sum", "period": _length(wide / 10, 2)},
-        "width": _length(wide, 2),
-        "height": _length(wide, 2),
-    },
-    "by_channel": lambda long, wide: {
-        "patterns": [{"name": "circle", "diameter": _length(wide / n, 2)} for n in (1, 1.5, 2)]
-    },
-    "gaps": lambda long, wide: {"pitch": _length(wide / 10, 2), "width": _length(wide / 12, 2)},
-    "cell_apertures": lambda long, wide: {"lattice": {"layout": "square", "pitch": _length(wide / 10, 2)}},
-    "cell_block": lambda long, wide: {
-        "lattice": {"layout": "square", "pitch": _length(wide / 10, 2)},
-        "rows": 8,
-        "columns": 8,
-    },
-    "cells": lambda long, wide: {"values": [[1, 0, 1], [0, 1, 0], [1, 0, 1]], "width": _length(wide, 2)},
-    "circle": lambda long, wide: {"diameter": _length(wide / 2, 2)},
-    "cosine_sum": lambda long, wide: {"period": _length(wide / 10, 2)},
-    "mura": lambda long, wide: {"prime": 13},
-    "polygon": lambda long, wide: {"sides": 6, "diameter": _length(wide / 2, 2)},
-    "product": lambda long, wide: {
-        "patterns": [
-            {"name": "circle", "diameter": _length(wide, 2)},
-            {"name": "cosine_sum", "period": _length(wide / 10, 2)},
-        ]
-    },
-    "gaussian": lambda long, wide: {"sigma": 0.005},
-    "radial": lambda long, wide: {"radii": [0, 0.005, 0.01], "profile": [1, 0.5, 0], "normalise": True},
-    "samples": lambda long, wide: {
-        "values": [[1, 2, 1], [2, 4, 2], [1, 2, 1]],
-        "slope_pitch": 0.005,
-        "normalise": True,
-    },
-    "top_hat": lambda long, wide: {"width": 0.01},
-    "abbe": lambda long, wide: {"nd": 1.5168, "V": 64.17},
-    "catalogue": lambda long, wide: {"glass": "N-BK7"},
-    "cauchy": lambda long, wide: {"A": 1.5046, "B": "0.0042 um2"},
-    "sellmeier": lambda long, wide: {"B": [1.2], "C": ["0.01 um2"]},
-    "table": lambda long, wide: {"wavelengths": ["400 nm", "700 nm"], "indices": [1.53, 1.513]},
-    "axicon": lambda long, wide: {"slope": 0.01},
-    "cubic": lambda long, wide: {"strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
-    "height_map": lambda long, wide: {
-        "heights": [[0, 0, 0, 0], [0, 2e-5, 2e-5, 0], [0, 2e-5, 2e-5, 0], [0, 0, 0, 0]],
-        "width": _length(1.4 * wide, 2),
-    },
-    "path_map": lambda long, wide: {
-        "paths": [[0, 0, 0, 0], [0, 1e-5, 1e-5, 0], [0, 1e-5, 1e-5, 0], [0, 0, 0, 0]],
-        "width": _length(1.4 * wide, 2),
-    },
-    "quadratic": lambda long, wide: {"focal_length": _length(2 * long, 2)},
-    "rough": lambda long, wide: {
-        "height_rms": "1 um",
-        "correlation_length": _length(wide / 50, 2),
-        "width": _length(1.4 * wide, 2),
-    },
-    "tilt": lambda long, wide: {"deflection": [0.02, 0.0]},
-    "zernike": lambda long, wide: {
-        "coefficients": ["0 um", "0 um", "0 um", "5 um"],
-        "diameter": _length(1.4 * wide, 2),
-    },
-}
-"""Required parameters of patterns, kernels and surfaces, from the camera's length and the width of the beam."""
+
+def _chosen(long: float, wide: float) -> Json:
+    """Required parameters of patterns, kernels, surfaces and glasses, from the same lengths."""
+    fine, half, whole, beyond = (_length(share * wide, 2) for share in (0.1, 0.5, 1, 1.4))
+    cosines = {"name": "cosine_sum", "period": fine}
+    circles = [{"name": "circle", "diameter": _length(wide / n, 2)} for n in (1, 1.5, 2)]
+    square = {"layout": "square", "pitch": fine}
+    height, path = ([[0] * 4, [0, each, each, 0], [0, each, each, 0], [0] * 4] for each in (2e-5, 1e-5))
+    return {
+        "angular_fringes": {"frequency": float(f"{12 * long / wide:.2g}")},
+        "bounded": {"pattern": cosines, "width": whole, "height": whole},
+        "by_channel": {"patterns": circles},
+        "gaps": {"pitch": fine, "width": _length(wide / 12, 2)},
+        "cell_apertures": {"lattice": square},
+        "cell_block": {"lattice": square, "rows": 8, "columns": 8},
+        "cells": {"values": [[1, 0, 1], [0, 1, 0], [1, 0, 1]], "width": whole},
+        "circle": {"diameter": half},
+        "cosine_sum": {"period": fine},
+        "mura": {"prime": 13},
+        "polygon": {"sides": 6, "diameter": half},
+        "product": {"patterns": [circles[0], cosines]},
+        "gaussian": {"sigma": 0.005},
+        "radial": {"radii": [0, 0.005, 0.01], "profile": [1, 0.5, 0], "normalise": True},
+        "samples": {"values": [[1, 2, 1], [2, 4, 2], [1, 2, 1]], "slope_pitch": 0.005, "normalise": True},
+        "top_hat": {"width": 0.01},
+        "abbe": {"nd": 1.5168, "V": 64.17},
+        "catalogue": {"glass": "N-BK7"},
+        "cauchy": {"A": 1.5046, "B": "0.0042 um2"},
+        "sellmeier": {"B": [1.2], "C": ["0.01 um2"]},
+        "table": {"wavelengths": ["400 nm", "700 nm"], "indices": [1.53, 1.513]},
+        "axicon": {"slope": 0.01},
+        "cubic": {"strength": float(f"{0.002 / (wide / 2) ** 2:.2g}")},
+        "height_map": {"heights": height, "width": beyond},
+        "path_map": {"paths": path, "width": beyond},
+        "quadratic": {"focal_length": _length(2 * long, 2)},
+        "rough": {"height_rms": "1 um", "correlation_length": _length(wide / 50, 2), "width": beyond},
+        "tilt": {"deflection": [0.02, 0.0]},
+        "zernike": {"coefficients": ["0 um", "0 um", "0 um", "5 um"], "diameter": beyond},
+    }

@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable, Hashable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
@@ -29,8 +28,9 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress
 from vcc.base.showing import spread
+from vcc.bench.editing import Editing
+from vcc.bench.imaging import Imaging
 from vcc.bench.page_words import page_words
-from vcc.bench.picture import Taken
 from vcc.bench.screen import Picture, jpeg, white_of
 from vcc.bench.side import scene_distances
 from vcc.camera import Camera
@@ -56,38 +56,12 @@ AROUND_FOCUS = 2.0
 """For scenes of unknown depth, the range on offer is the distance in focus divided by this, to infinity."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """The input of decoding.
-
-    Args:
-        train: the camera.
-        light_field: the light field before it.
-        of: the key of the camera and the light field.
-        noise: whether electronics record the image.
-        picture: returns the whole image, and makes it if needed.
-        turn: held while all cores are busy; yields a progress callback, which may end the work.
-    """
-
-    train: Train
-    light_field: LightField
-    of: Hashable
-    noise: bool
-    picture: Callable[[], Taken]
-    turn: Callable[[], AbstractContextManager[Progress]]
-
-    @property
-    def camera(self) -> Camera:
-        """The camera as a `vcc.Camera`."""
-        return Camera(self.train.elements, self.train.sensor)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Decoded(Brief):
     """A decoded light field and its display settings.
 
     Args:
-        of: its key: `Asked.of`, and whether there was noise.
+        of: its key: the camera and its light field, and whether there was noise.
         decoder: that decoded it.
         views: the light field.
         white: the radiance shown as white in all its images.
@@ -102,57 +76,66 @@ class Decoded(Brief):
 
 
 class Decoding:
-    """The latest decoded light field and calibration of a session."""
+    """The latest decoded light field and calibration of a session.
 
-    def __init__(self) -> None:
+    Args:
+        editing: the document.
+        imaging: its images.
+    """
+
+    def __init__(self, editing: Editing, imaging: Imaging) -> None:
+        self._editing, self._imaging = editing, imaging
         self._calibrated: tuple[Hashable, Image, tuple[str, ...]] | None = None
         self._decoded: Decoded | None = None
 
-    def answer(self, message: Json, asked: Asked) -> Answer:
+    def answer(self, message: Json) -> Answer:
         """The answer to one of `QUESTIONS`, and its images.
 
         Args:
             message: the question.
-            asked: the camera and its light field.
 
         Raises:
             InputError: invalid distance; for ``"refocused"``, a camera that cannot be decoded.
         """
-        distance = _distance(message, asked.train)
+        train, light_field = self._editing.train, self._editing.light_field()
+        distance = _distance(message, train)
         try:
-            decoded = self._of(asked)
+            decoded = self._of(train, light_field)
         except InputError as error:
             if message["what"] == "refocused":
                 raise
             return {"why": page_words(str(error))}, []
-        with asked.turn() as progress:
+        with self._imaging.all_cores() as progress:
             picture = _refocused(decoded, distance, progress)
         if message["what"] == "refocused":
             return {"distance": _finite(distance)}, [picture]
         middle = decoded.views.view(*decoded.views.grid.middle_view).to_numpy()
         pictures = [_jpeg(_sheet(decoded.views), decoded.white), _jpeg(middle, decoded.white), picture]
-        return _answer(decoded, distance, asked), pictures
+        return _answer(decoded, distance, train, light_field), pictures
 
-    def _of(self, asked: Asked) -> Decoded:
-        kept = self._decoded
-        if kept is None or kept.of != (asked.of, asked.noise):
-            self._decoded = kept = self._made(asked)
+    def _of(self, train: Train, light_field: LightField) -> Decoded:
+        document, kept = self._editing.document, self._decoded
+        field = self._editing.offered.field(document.light_field)
+        of = train, field, document.views, document.aperture, document.wavelengths
+        if kept is None or kept.of != (of, document.noise):
+            camera = Camera(train.elements, train.sensor)
+            self._decoded = kept = self._made(of, document.noise, camera, light_field)
         return kept
 
-    def _made(self, asked: Asked) -> Decoded:
-        decoder = Decoder.of(asked.camera, asked.light_field.grid)
-        taken = asked.picture()
+    def _made(self, of: Hashable, noise: bool, camera: Camera, light_field: LightField) -> Decoded:
+        decoder = Decoder.of(camera, light_field.grid)
+        taken = self._imaging.whole()
         recording = taken.image if taken.recording is None else taken.recording
-        with asked.turn() as progress:
-            if self._calibrated is None or self._calibrated[0] != asked.of:
+        with self._imaging.all_cores() as progress:
+            if self._calibrated is None or self._calibrated[0] != of:
                 self._calibrated = None  # never keep two at once
-                found, warned = _with_warnings(decoder.calibration, asked.light_field, progress)
-                self._calibrated = asked.of, found, tuple(f"calibration: {words}" for words in warned)
+                found, warned = _with_warnings(decoder.calibration, light_field, progress)
+                self._calibrated = of, found, tuple(f"calibration: {words}" for words in warned)
             _, calibration, of_white = self._calibrated
             views, warned = _with_warnings(decoder.decoded, recording, calibration, progress)
         remarks = tuple(dict.fromkeys((*of_white, *warned)))
         white = white_of(np.asarray(views.values).reshape(-1, *views.shape[3:]))
-        return Decoded((asked.of, asked.noise), decoder, views, white, remarks)
+        return Decoded((of, noise), decoder, views, white, remarks)
 
 
 def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, list[str]]:
@@ -162,8 +145,11 @@ def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, li
         return work(*given), [str(each.message) for each in caught]
 
 
-def _answer(decoded: Decoded, distance: float, asked: Asked) -> Json:
-    nearest, farthest = _range(asked, distance)
+def _answer(decoded: Decoded, distance: float, train: Train, light_field: LightField) -> Json:
+    """What is said of decoded views; the range of distances is that of the scene and the distance in focus."""
+    focus = _focus(train)
+    ends = [each for each in scene_distances(light_field.grid).values() if each > 0]
+    every = [*(ends or [focus / AROUND_FOCUS if math.isfinite(focus) else 1.0, math.inf]), focus, distance]
     nv, nu, nt, ns = decoded.views.shape[:4]
     way = {"lenslets": "lenslets", "cosines": "a mask of cosines"}[decoded.decoder.way]
     return {
@@ -171,21 +157,11 @@ def _answer(decoded: Decoded, distance: float, asked: Asked) -> Json:
         "remarks": list(decoded.remarks),
         "views": [nv, nu],
         "shape": [nt, ns],
-        "nearest": _finite(nearest),
-        "farthest": _finite(farthest),
-        "focus": _finite(_focus(asked.train)),
+        "nearest": _finite(min(every)),
+        "farthest": _finite(max(every)),
+        "focus": _finite(focus),
         "distance": _finite(distance),
     }
-
-
-def _range(asked: Asked, distance: float) -> tuple[float, float]:
-    """The nearest and the farthest distance on offer: the range of the scene and the distance in focus."""
-    focus = _focus(asked.train)
-    ends = [each for each in scene_distances(asked.light_field.grid).values() if each > 0]
-    if not ends:
-        ends = [focus / AROUND_FOCUS if math.isfinite(focus) else 1.0, math.inf]
-    every = [*ends, focus, distance]
-    return min(every), max(every)
 
 
 def _focus(train: Train) -> float:

@@ -18,9 +18,9 @@ from vcc.base.describe import is_default
 from vcc.base.errors import InputError
 from vcc.base.units import deg, mm, nm, um
 from vcc.bench.document import Document, shown
+from vcc.bench.editing import Editing
 from vcc.bench.picture import Taken
 from vcc.files.camera_families import FAMILIES, needed, parameters_of, unit_of
-from vcc.files.camera_reading import Beside
 from vcc.files.camera_writing import NOWHERE, tables_of_train
 from vcc.optics.prescription import Prescription, Surface
 from vcc.optics.train import Train
@@ -32,29 +32,12 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 """Date of all files in an archive, the earliest possible: the same camera gives the same bytes."""
 
 
-@dataclass(frozen=True)
-class OnBench:
-    """The input of an export.
-
-    Args:
-        document: the state of the bench.
-        train: its camera.
-        source: lines of Python that make ``light_field``; empty if a program cannot make it.
-        beside: the files that the camera may name.
-    """
-
-    document: Document
-    train: Train
-    source: str
-    beside: Beside
-
-
-def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tuple[str, str, bytes]:
+def exported(what: Any, editing: Editing, taken: Taken | None, white: float) -> tuple[str, str, bytes]:
     """A file: its name, its media type and its bytes.
 
     Args:
         what: one of `KINDS`.
-        bench: the input.
+        editing: the document and its camera.
         taken: the whole image, for "png" and "exr".
         white: the irradiance that a PNG shows as white.
 
@@ -62,10 +45,10 @@ def exported(what: Any, bench: OnBench, taken: Taken | None, white: float) -> tu
         InputError: unknown kind, or the camera cannot be written.
     """
     if what == "toml":
-        text, arrays = camera_file(bench.train)
-        return _with_arrays("camera", "toml", "application/toml", _left_out(bench.document) + text, arrays)
+        text, arrays = camera_file(editing.train)
+        return _with_arrays("camera", "toml", "application/toml", _left_out(editing.document) + text, arrays)
     if what == "python":
-        text, arrays = program(bench, white)
+        text, arrays = program(editing, white)
         return _with_arrays("picture", "py", "text/x-python", text, arrays)
     if what in ("png", "exr") and taken is not None:
         kind = {"png": "image/png", "exr": "image/x-exr"}[what]
@@ -110,44 +93,44 @@ def camera_file(train: Train) -> tuple[str, dict[str, NDArray[np.float64]]]:
 # --- a program ---
 
 
-def program(bench: OnBench, white: float) -> tuple[str, dict[str, NDArray[np.float64]]]:
+def program(editing: Editing, white: float) -> tuple[str, dict[str, NDArray[np.float64]]]:
     """A program that makes the image that a bench shows, and the arrays that it loads.
 
     Args:
-        bench: the input.
+        editing: the document and its camera.
         white: the irradiance shown as white.
     """
     writer = _Writer({}, set())
-    elements = "".join(f"        {writer.made(element)},\n" for element in bench.train.elements)
-    camera = f"camera = vcc.Camera(\n    [\n{elements}    ],\n    {writer.made(bench.train.sensor)},\n)"
-    source = bench.source or (
+    elements = "".join(f"        {writer.made(element)},\n" for element in editing.train.elements)
+    camera = f"camera = vcc.Camera(\n    [\n{elements}    ],\n    {writer.made(editing.train.sensor)},\n)"
+    source = editing.offered.field(editing.document.light_field).source or (
         'raise SystemExit("open the light field of the bench here, as light_field")  # then remove this line'
     )
-    views = bench.document.views
+    views = editing.document.views
     if views is not None:
         (a, b), (c, d) = views.rows, views.columns
         source += f"\nlight_field = light_field[{a} : {b + 1}, {c} : {d + 1}]"
-    if bench.document.wavelengths is not None:
-        metres = [units.parse(each, "length", "wavelengths") for each in bench.document.wavelengths]
+    if editing.document.wavelengths is not None:
+        metres = [units.parse(each, "length", "wavelengths") for each in editing.document.wavelengths]
         source += f"\nlight_field = light_field.with_wavelengths({metres!r})"
-    if bench.document.aperture.is_moved:
-        source += f"\n{bench.document.aperture.in_python}"
+    if editing.document.aperture.is_moved:
+        source += f"\n{editing.document.aperture.in_python}"
     lines = [
         '"""The picture that the optical bench showed."""\n',
         *sorted({"import vcc", *(["import numpy as np"] if writer.uses_numpy else [])}),
         *([f"from vcc.units import {', '.join(sorted(writer.names))}"] if writer.names else []),
         f"\n{source}",
         camera,
-        *_picture_lines(bench),
+        *_picture_lines(editing),
         f'print(image.save("picture.png", exposure=1 / {white!r}).description)\n',
     ]
     return "\n".join(lines), writer.arrays
 
 
-def _picture_lines(bench: OnBench) -> list[str]:
-    if not bench.document.noise:
+def _picture_lines(editing: Editing) -> list[str]:
+    if not editing.document.noise:
         return ["image = camera.capture(light_field)"]
-    electronics = bench.train.sensor.electronics
+    electronics = editing.train.sensor.electronics
     filtered = electronics is not None and electronics.color_filter is not None
     image = 'recording.demosaiced("bilinear")' if filtered else "recording.image()"
     return ["recording = camera.expose(light_field)", f"image = {image}"]

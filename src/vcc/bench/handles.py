@@ -32,7 +32,7 @@ def handles_of(element: Element, axis: int) -> list[Handle]:
         # 1 m of its pattern is a slope of 1: the handle is on the steepest ray, at the entrance plane.
         (where, value), away = size, element.z if element.z > 0 else BEFORE
         edge = centre + away * value / 2
-        found.append(_handle(where, "steepest slope", value, -away, edge, 2 / away, unit="slope"))
+        found.append(_handle(where, "slope", value, -away, edge, 2 / away, unit="slope"))
     elif size is not None:
         where, value = size
         found.append(_handle(where, " ".join(where).replace("_", " "), value, 0.0, centre + value / 2, 2.0))

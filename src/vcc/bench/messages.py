@@ -415,9 +415,16 @@ class FailedMessage(TypedDict):
 
 
 class PinsMessage(TypedDict):
-    """All pins; the buffers are the thumbnails, then the image of the reference."""
+    """All pins; the buffers are the thumbnails, then the image of the reference.
+
+    Args:
+        psnr: of the image that is shown against the reference, dB.
+        same: whether it equals that.
+    """
 
     pins: list[Pin]
+    psnr: float | None
+    same: bool
 
 
 class FileMessage(TypedDict):

@@ -105,9 +105,10 @@ class Pins:
         found = None if reference is None else psnr(values, reference.values, reference.white)
         return (None, found is not None) if found is None or math.isinf(found) else (found, False)
 
-    def message(self, look: Look) -> tuple[messages.PinsMessage, list[bytes]]:
-        """All pins for the client: thumbnails, then the image of the reference."""
+    def message(self, look: Look, shown: Picture | None) -> tuple[messages.PinsMessage, list[bytes]]:
+        """All pins and the image that is shown, compared; thumbnails, then the image of the reference."""
         reference = self.reference
+        now, equal = (None, False) if shown is None else self.against_reference(shown)
         pins: list[messages.Pin] = []
         for each in self._kept:
             found, same = self.against_reference(each.values)
@@ -123,7 +124,7 @@ class Pins:
         pictures = [each.thumbnail for each in self._kept]
         if reference is not None:
             pictures.append(jpeg(reference.values, reference.white, look=look))
-        return {"pins": pins}, pictures
+        return {"pins": pins, "psnr": now, "same": equal}, pictures
 
 
 def _difference(before: Document | None, after: Document) -> str:

@@ -349,7 +349,7 @@ def run(
             timeout_graceful_shutdown=0,
             limit_concurrency=8 * MOST_CLIENTS,
         )
-        server = uvicorn.Server(config)
+        server: Any = uvicorn.Server(config)
         server.capture_signals = contextlib.nullcontext  # uvicorn's own raise the signal again at the end
 
         def end(*_: Any) -> None:

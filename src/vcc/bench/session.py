@@ -73,7 +73,7 @@ class Session:
         self._editing = Editing(offered)
         self._imaging = Imaging(self._editing, self._check_wanted)
         self._pins = Pins()
-        self._decoding = decoded.Decoding()
+        self._decoding = decoded.Decoding(self._editing, self._imaging)
         self._inbox = Inbox()
         self._changed = threading.Condition()
         self._closed = False
@@ -471,12 +471,11 @@ class Session:
     def _do_compare(self, message: Json) -> None:
         self._pins.compare(message.get("number"))
         self._tell_pins()
-        taken = self._imaging.taken
-        if taken is not None and not taken.coarse and self._wanted is None:
-            self._tell_picture(taken, Wanted(turn_of(message), moving=False))
 
     def _tell_pins(self) -> None:
-        self._tell("pins", *self._pins.message(self._look))
+        taken = self._imaging.taken
+        shown = None if taken is None or taken.coarse else taken.values
+        self._tell("pins", *self._pins.message(self._look, shown))
 
     def _do_value(self, message: Json) -> None:
         taken = self._imaging.there()
@@ -504,7 +503,7 @@ class Session:
         if what in (*decoded.QUESTIONS, "scrub"):
             self._finish()
         if what in decoded.QUESTIONS:
-            found, buffers = self._decoding.answer(message, self._asked())
+            found, buffers = self._decoding.answer(message)
         elif what == "profile":
             found = screen.profile(self._imaging.whole().values, train.sensor, message.get("ends"))
         elif what == "scrub":
@@ -512,24 +511,6 @@ class Session:
         else:
             found, buffers = answers.answer(what, message, train, self._editing.light_field())
         self._tell("answer", {"what": what, **found}, buffers)
-
-    def _asked(self) -> decoded.Asked:
-        """The input of decoding."""
-        document, train = self.document, self._editing.train
-        return decoded.Asked(
-            train,
-            self._editing.light_field(),
-            (
-                train,
-                self.offered.field(document.light_field),
-                document.views,
-                document.aperture,
-                document.wavelengths,
-            ),
-            document.noise,
-            self._imaging.whole,
-            self._imaging.all_cores,
-        )
 
     def _frames(self, message: Json) -> tuple[Json, list[bytes]]:
         """The frames of a sweep, to be looked at one by one."""
@@ -540,16 +521,14 @@ class Session:
     def _do_export(self, message: Json) -> None:
         if message.get("what") != "toml":
             self._finish()
-        document, what = self.document, message.get("what")
+        what = message.get("what")
         if what == "film":
-            sweep = sweep_of(message, document)
+            sweep = sweep_of(message, self.document)
             frames = [screen.codes(each, self._white) for each in self._swept(sweep.documents)]
             name, kind, data = sweep.film(frames)
         else:
-            source = self.offered.field(document.light_field).source
-            bench = export.OnBench(document, self._editing.train, source, self.offered.beside)
             taken = self._imaging.whole() if what in ("png", "exr") else None
-            name, kind, data = export.exported(what, bench, taken, self._white)
+            name, kind, data = export.exported(what, self._editing, taken, self._white)
         self._tell("file", {"name": name, "type": kind}, [data])
 
     def _swept(self, documents: Sequence[Document]) -> Any:

@@ -285,8 +285,8 @@ def main() -> None:
         stopped = code == INTERRUPTED
     except KeyboardInterrupt:  # a second Ctrl-C while the first was handled
         code = INTERRUPTED
-    except SystemExit:  # a server that was ended
-        code = 0
+    except SystemExit as ended:  # a server, by Ctrl-C
+        code = ended.code if isinstance(ended.code, int) else 0
     if stopped and threading.active_count() > 1:
         # The work of other threads is no longer needed, and Python would wait for it.
         sys.stdout.flush()
