@@ -2,25 +2,42 @@
 
 import { nothing, svg } from "lit";
 
-import type { Bench } from "./bench";
+import type { Bench, Selected } from "./bench";
 import type { Mapping } from "./frame";
 import { inMillimetres, plain, short } from "./numbers";
-import type { Handle, Value, Where } from "./protocol";
+import type { Handle, Snap, Value, Where } from "./protocol";
 
 /** Lengths that are dragged stay at or above this, metres. */
 const LEAST = 1e-5;
 const RADIUS = 5;
 
+/** What is dragged: a handle, or a part by its place on the axis. */
 export interface Held {
+  which: Selected;
   handle: Handle;
   where: Where;
   value: number;
   /** What the document had when it began. */
   from: Value;
-  /** Of the pointer when it began, pixels. */
+  /** Of the pointer when it began, pixels; along the axis from the part. */
   x: number;
   y: number;
+  grip: number;
   moved: boolean;
+  /** Places to which a part is pulled, as they were when it began, and the one that is near. */
+  snaps: Snap[];
+  snap: Snap | null;
+}
+
+const PLACE = "place";
+
+/** A part's place on the axis, as handles have their parameters. */
+export function placeHandle(value: number): Handle {
+  return { where: ["z"], words: PLACE, value, z: 0, height: 0, rate: 1, along: "z", unit: "length", pair: null, other: null };
+}
+
+export function isPlace({ handle }: Held): boolean {
+  return handle.words === PLACE;
 }
 
 /** Of the selected part; those of the light field's plane are its place alone. */
@@ -45,6 +62,7 @@ export function valueAt(held: Held, x: number, y: number, scale: Mapping): { val
 
 /** A number of a handle, kept where it makes sense and rounded as a hand can place it. */
 export function asValue(handle: Handle, wanted: number): { value: number; words: Value } {
+  if (handle.words === PLACE) return { value: wanted, words: inMillimetres(wanted) };
   const sized = handle.words !== "decentre" && handle.unit !== "angle";
   const sign = handle.value < 0 ? -1 : 1;
   let value = sized && sign * wanted < LEAST ? sign * LEAST : wanted;

@@ -4,11 +4,11 @@ import { html, svg, css, nothing } from "lit";
 
 import type { Selected } from "./bench";
 import { Frame, MARGIN, type Mapping } from "./frame";
-import { asValue, drawnCone, drawnHandle, handlesOf, inWords, placeOf, valueAt, type Held } from "./handles";
+import { asValue, drawnCone, drawnHandle, handlesOf, inWords, isPlace, placeHandle, placeOf, valueAt, type Held } from "./handles";
 import { drawnDistances, drawnLabels } from "./labels";
-import { axisStep, inMillimetres, short } from "./numbers";
+import { axisStep, short } from "./numbers";
 import { Part, controls } from "./part";
-import type { Handle, Side, Snap, Table, Value, Where } from "./protocol";
+import type { Handle, Side, Snap, Table, Value } from "./protocol";
 import { drawnRays, legend } from "./rays";
 import { drawn, drawnAperture, drawnSensor, type Scale } from "./shapes";
 import { sign } from "./signs";
@@ -30,26 +30,10 @@ const CLOSE = 26;
 /** In a narrower drawing it would cover the rays. */
 const NARROW = 460;
 
-interface Drag {
-  which: Selected;
-  /** Pointer's place minus the part's when it began, pixels. */
-  grip: number;
-  /** Where the part stood when it began: metres, and as the document had it. */
-  from: number;
-  written: Value;
-  z: number;
-  /** Places to which it is pulled, as they were when it began. */
-  snaps: Snap[];
-  snap: Snap | null;
-  moved: boolean;
-}
-
 export class SideView extends Part {
-  static override properties = { ...Part.properties, width: { state: true }, height: { state: true }, drag: { state: true }, held: { state: true }, hover: { state: true }, magnifies: { state: true } };
+  static override properties = { ...Part.properties, width: { state: true }, height: { state: true }, held: { state: true }, hover: { state: true }, magnifies: { state: true } };
   declare width: number;
   declare height: number;
-  declare drag: Drag | null;
-  /** The handle that is dragged. */
   declare held: Held | null;
   declare hover: Selected | null;
   declare magnifies: boolean;
@@ -65,7 +49,7 @@ export class SideView extends Part {
   constructor() {
     super();
     this.width = this.height = 0;
-    this.drag = this.held = this.hover = null;
+    this.held = this.hover = null;
     this.magnifies = true;
   }
 
@@ -99,7 +83,7 @@ export class SideView extends Part {
   }
 
   private mapping(): Mapping {
-    this.frame.follow(this.bench.side!, this.drag !== null || this.held !== null);
+    this.frame.follow(this.bench.side!, this.held !== null);
     return this.frame.mapping(this.width, this.height);
   }
 
@@ -174,24 +158,16 @@ export class SideView extends Part {
       return;
     }
     const handle = this.handleAt(event, point);
-    if (handle) {
-      this.held = this.hold(handle, point);
-      this.renderRoot.querySelector<SVGElement>(`[data-handle="${handle.words}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
-      event.preventDefault();
-      return;
-    }
-    const which = this.partsAt(event, point)[0];
+    const which = handle ? this.bench.selected : this.partsAt(event, point)[0];
     if (which === undefined) {
       this.panning = true;
       return;
     }
-    const z = this.bench.placeOf(which);
-    this.drag = { which, grip: point.x - this.mapping().x(z), from: z, written: this.written(which), z, snaps: this.snapsOf(which), snap: null, moved: false };
-    const again = this.bench.selected === which;
+    this.again = !handle && this.bench.selected === which;
+    this.held = this.hold(which, handle, point);
     this.bench.select(which);
-    this.renderRoot.querySelector<SVGElement>(`[data-part="${which}"]`)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
-    this.drag.moved = false;
-    this.again = again;
+    const taken = handle ? `[data-handle="${handle.words}"]` : `[data-part="${which}"]`;
+    this.renderRoot.querySelector<SVGElement>(taken)?.focus({ preventScroll: true, focusVisible: false } as FocusOptions);
     event.preventDefault();
   }
   /** Whether what is pressed on was selected before: a click then selects the next part in the same place. */
@@ -210,8 +186,7 @@ export class SideView extends Part {
       const apart = (one: { x: number; y: number }) => Math.max(Math.hypot(one.x - other.x, one.y - other.y), 1);
       this.frame.pan((point.x - before.x) / 2, (point.y - before.y) / 2, this.width, this.height);
       this.zoom(apart(point) / apart(before), (point.x + other.x) / 2, (point.y + other.y) / 2);
-    } else if (this.held) this.moveHandle(this.held, point);
-    else if (this.drag) this.movePart(this.drag, point, event.altKey);
+    } else if (this.held) this.drag(this.held, point, event.altKey);
     else if (this.panning && this.frame.zoom > 1) {
       this.frame.pan(point.x - before.x, point.y - before.y, this.width, this.height);
       this.requestUpdate();
@@ -221,70 +196,70 @@ export class SideView extends Part {
 
   /** Places of the hand that come before the browser's next frame, where it tells them: an image is asked for at once. */
   private moveRaw(event: PointerEvent): void {
-    if ((this.drag || this.held) && this.pointers.size === 1) this.move(event);
+    if (this.held && this.pointers.size === 1) this.move(event);
   }
 
-  private hold(handle: Handle, point = { x: 0, y: 0 }): Held {
-    const table = this.bench.tableOf(this.bench.selected);
-    const from = handle.where.reduce<Value>((at, step) => (at as Table | null)?.[step] ?? null, table ?? null);
-    return { handle, where: [...this.bench.whereOf(this.bench.selected), ...handle.where] as Where, value: handle.value, from, ...point, moved: false };
+  /** Take hold of a handle, or of a part. */
+  private hold(which: Selected, handle: Handle | null, point = { x: 0, y: 0 }): Held {
+    const place = this.bench.placeOf(which);
+    const taken = handle ?? placeHandle(place);
+    const table = this.bench.tableOf(which) ?? null;
+    const from = taken.where.reduce<Value>((at, step) => (at as Table | null)?.[step] ?? null, table) ?? (handle ? null : "0 mm");
+    return {
+      which, handle: taken, where: [...this.bench.whereOf(which), ...taken.where], value: taken.value, from, ...point,
+      grip: point.x - this.mapping().x(place), moved: false, snaps: handle ? [] : this.snapsOf(which), snap: null,
+    };
   }
 
-  /** The place of a part as the document has it. */
-  private written(which: Selected): Value {
-    return this.bench.tableOf(which)?.["z"] ?? "0 mm";
-  }
-
-  private moveHandle(held: Held, point: { x: number; y: number }): void {
-    if (!held.moved && Math.hypot(point.x - held.x, point.y - held.y) < 2) return;
-    const { value, words } = valueAt(held, point.x, point.y, this.mapping());
-    this.held = { ...held, value, moved: true };
-    this.bench.set(held.where, words, true);
-  }
-
-  private movePart(drag: Drag, point: { x: number; y: number }, free: boolean): void {
+  private drag(held: Held, point: { x: number; y: number }, free: boolean): void {
     const scale = this.mapping();
-    const step = axisStep(this.frame.length / this.frame.zoom) / 10;
-    const x = point.x - drag.grip;
-    let z = Math.round(scale.z(x) / step) * step;
-    const snap = free ? null : this.snapNear(drag.snaps, x, scale);
-    if (snap && Math.abs(scale.x(snap.z) - x) < PULL) z = snap.z;
-    if (z === drag.z && drag.moved) return;
-    if (!drag.moved && Math.abs(scale.x(z) - scale.x(drag.from)) < 2) return;
-    this.drag = { ...drag, z, snap, moved: true };
-    this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(z), true);
+    const part = isPlace(held);
+    const next = part ? this.pulled(held, point.x - held.grip, free, scale) : { value: valueAt(held, point.x, point.y, scale).value, snap: null };
+    const away = part ? scale.x(next.value) - scale.x(held.handle.value) : Math.hypot(point.x - held.x, point.y - held.y);
+    if (held.moved ? next.value === held.value : Math.abs(away) < 2) return;
+    this.put({ ...held, ...next });
     // Only at the very border: a drawing whose scale changed under the hand would run away.
-    if (point.x < EDGE || point.x > this.width - EDGE) this.frame.reach(z, this.width, this.height);
+    if (part && (point.x < EDGE || point.x > this.width - EDGE)) this.frame.reach(next.value, this.width, this.height);
+  }
+
+  /** Where a part comes to stand: at a round place, or where something is sharp near that. */
+  private pulled(held: Held, x: number, free: boolean, scale: Mapping): { value: number; snap: Snap | null } {
+    const step = axisStep(this.frame.length / this.frame.zoom) / 10;
+    const snap = free ? null : this.snapNear(held.snaps, x, scale);
+    return { value: snap && Math.abs(scale.x(snap.z) - x) < PULL ? snap.z : Math.round(scale.z(x) / step) * step, snap };
+  }
+
+  private put(held: Held): void {
+    this.held = { ...held, moved: true };
+    this.bench.set(held.where, asValue(held.handle, held.value).words, true);
   }
 
   private lift(event: PointerEvent): void {
-    const { drag, again } = this;
+    const { held, again } = this;
     const point = this.pointOf(event);
     this.pointers.delete(event.pointerId);
-    if (drag && !drag.moved && again) {
+    if (held && !held.moved && again) {
       const here = this.partsAt(event, point);
       const scale = this.mapping();
-      const same = here.filter((which) => Math.abs(scale.x(this.bench.placeOf(which)) - scale.x(drag.z)) < 2);
-      if (same.length > 1) this.bench.select(same[(same.indexOf(drag.which) + 1) % same.length]!);
+      const same = here.filter((which) => Math.abs(scale.x(this.bench.placeOf(which)) - scale.x(held.value)) < 2);
+      if (same.length > 1) this.bench.select(same[(same.indexOf(held.which) + 1) % same.length]!);
     }
     this.up();
   }
 
   private up(): void {
-    const { drag, held } = this;
+    const { held } = this;
     this.panning = false;
-    this.drag = this.held = null;
-    if (drag?.moved) this.bench.set([...this.bench.whereOf(drag.which), "z"], inMillimetres(drag.z));
+    this.held = null;
     if (held?.moved) this.bench.set(held.where, asValue(held.handle, held.value).words);
   }
 
   /** End a movement, by the pointer or by keys, as if it had not begun. */
   private takeBack(): void {
-    const { drag, held } = this;
+    const { held } = this;
     window.clearTimeout(this.keyTimer);
     this.panning = false;
-    this.drag = this.held = null;
-    if (drag?.moved) this.bench.set([...this.bench.whereOf(drag.which), "z"], drag.written);
+    this.held = null;
     if (held?.moved) this.bench.set(held.where, held.from);
   }
 
@@ -307,11 +282,9 @@ export class SideView extends Part {
     if (by && !event.ctrlKey && !event.metaKey) {
       event.preventDefault();
       const step = axisStep(this.frame.length / this.frame.zoom) * (event.shiftKey ? 10 : event.altKey ? 0.1 : 1);
-      const z = this.bench.placeOf(which) + by * step;
-      const { from, written } = this.drag ?? { from: this.bench.placeOf(which), written: this.written(which) };
-      this.drag = { which, grip: 0, from, written, z: Math.round(z / (step / 10)) * (step / 10), snaps: [], snap: null, moved: true };
-      this.bench.set([...this.bench.whereOf(which), "z"], inMillimetres(this.drag.z), true);
-      this.frame.reach(this.drag.z, this.width, this.height);
+      const value = Math.round((this.bench.placeOf(which) + by * step) / (step / 10)) * (step / 10);
+      this.put({ ...(this.held ?? this.hold(which, null)), value, snap: null });
+      this.frame.reach(value, this.width, this.height);
       this.waitForKeys();
     } else if (event.key === "Enter") {
       this.dispatchEvent(new CustomEvent("type-place", { bubbles: true, composed: true }));
@@ -328,10 +301,9 @@ export class SideView extends Part {
     event.preventDefault();
     event.stopPropagation();
     const size = handle.words === "decentre" ? axisStep(this.frame.length) : handle.unit === "angle" ? Math.PI / 180 : 0.02 * Math.abs(handle.value);
-    const held = this.held?.handle.words === handle.words ? this.held : this.hold(handle);
-    const { value, words } = asValue(handle, held.value + by * size * (event.shiftKey ? 5 : event.altKey ? 0.2 : 1));
-    this.held = { ...held, value, moved: true };
-    this.bench.set(this.held.where, words, true);
+    const held = this.held?.handle.words === handle.words ? this.held : this.hold(this.bench.selected, handle);
+    const { value } = asValue(handle, held.value + by * size * (event.shiftKey ? 5 : event.altKey ? 0.2 : 1));
+    this.put({ ...held, value });
     this.waitForKeys();
   }
 
@@ -347,7 +319,7 @@ export class SideView extends Part {
   }
 
   private keyOfDrawing(event: KeyboardEvent): void {
-    if (event.key === "Escape" && (this.drag || this.held)) {
+    if (event.key === "Escape" && this.held) {
       event.preventDefault();
       this.takeBack();
     }
@@ -367,7 +339,7 @@ export class SideView extends Part {
     const side = this.bench.side;
     if (!side || !this.width || !this.height) return nothing;
     const scale = this.mapping();
-    const cursor = this.drag || this.hover !== null ? "grab" : this.frame.zoom > 1 ? "pan" : "";
+    const cursor = this.held || this.hover !== null ? "grab" : this.frame.zoom > 1 ? "pan" : "";
     return html`
       <svg width=${this.width} height=${this.height} class="${cursor} ${this.bench.open ? "" : "stale"}" role="group" aria-label="The camera from the side"
         style="touch-action:${this.width > ALL_RAYS || this.frame.zoom > 1 ? "none" : "pan-y"}"
@@ -407,7 +379,7 @@ export class SideView extends Part {
 
   /** What stands close to the sensor, and where rays meet, enlarged; nothing where the drawing shows it already. */
   private drawMagnifier(side: Side, scale: Mapping) {
-    if (this.frame.zoom > 1 || this.width < NARROW || this.drag?.which === "light field") return nothing;
+    if (this.frame.zoom > 1 || this.width < NARROW || this.held?.which === "light field") return nothing;
     const sensor = this.bench.placeOf("sensor");
     const near = this.parts().map((which) => this.bench.placeOf(which) + this.lengthOf(which));
     const every = [...near, ...side.rays.flatMap((each) => (each.meet ? [each.meet[0]] : []))].filter((z) => Math.abs(scale.x(z) - scale.x(sensor)) < CLOSE);
@@ -446,9 +418,9 @@ export class SideView extends Part {
   }
 
   private drawSnap(scale: Scale) {
-    const snap = this.drag?.snap;
+    const snap = this.held?.snap;
     if (!snap) return nothing;
-    const held = this.drag!.z === snap.z;
+    const held = this.held!.value === snap.z;
     const x = scale.x(snap.z);
     const left = x > this.width - 110;
     return svg`<g class="snap ${held ? "held" : ""}">

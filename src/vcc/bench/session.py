@@ -26,7 +26,7 @@ from vcc.bench.document import Document
 from vcc.bench.editing import Editing
 from vcc.bench.focusing import distance_at
 from vcc.bench.imaging import Imaging, Wanted
-from vcc.bench.inbox import CHANGES, Inbox, turn_of
+from vcc.bench.inbox import CHANGES, MOST_WAITING, Inbox, turn_of
 from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
 from vcc.bench.page_words import page_words
@@ -267,8 +267,9 @@ class Session:
     def _catch_up(self, message: Json) -> None:
         """Make the changes of values during a lost connection; what is refused of them leaves the others."""
         changes = message.get("changes", [])
-        if not isinstance(changes, list) or not all(isinstance(each, dict) for each in changes):
-            raise InputError("changes is a list of tables of where and value")
+        tables = isinstance(changes, list) and all(isinstance(each, dict) for each in changes)
+        if not tables or len(changes) > MOST_WAITING:
+            raise InputError(f"changes is a list of at most {MOST_WAITING} tables of where and value")
         for each in changes:
             try:
                 remark = self._editing.set({"where": each.get("where"), "value": each.get("value")})
