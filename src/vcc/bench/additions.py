@@ -34,7 +34,7 @@ from vcc.files.camera_reading import Beside, TrainAsWritten, read_array
 from vcc.files.camera_writing import NOWHERE, tables_of_train
 from vcc.optics import FirstOrder, Lens, RealLens
 from vcc.optics.sensor import Sensor
-from vcc.optics.train import Train
+from vcc.optics.train import Stage, Train
 from vcc.prescriptions import built_in_lenses, load_lens
 
 Json = dict[str, Any]
@@ -243,11 +243,9 @@ def _suitable_place(kind: str, train: Train) -> float:
         if kind == "lens_array":
             return max(z - units.parse(_lenslets(train)["focal_length"], "length", "z"), 0.0)
         return z - z / (16 if kind == "louvre" else 25)  # a louvre is z/20 high
-    stop = next((one.z for one in train.elements if isinstance(one, Lens | FirstOrder)), None)
-    if stop is None:
-        stop = next((stage.z for stage in train.stages if np.isfinite(stage.opening[0])), 0.0)
     if kind not in IN_GAPS:
-        return min(stop, z)
+        first = next((one for one in train.elements if isinstance(one, Lens | FirstOrder)), _stop(train))
+        return 0.0 if first is None else min(first.z, z)
     low, gap = _widest_gap(train)
     return low + gap / 2
 
@@ -265,7 +263,7 @@ def _widest_gap(train: Train) -> tuple[float, float]:
 def _lenslets(train: Train) -> Json:
     """Lenslets whose micro-images fill `LENSLET_PIXELS` pixels: their f-number is that of the first opening."""
     pitch = LENSLET_PIXELS * min(train.sensor.pitches)
-    stop = next((stage for stage in train.stages if np.isfinite(stage.opening[0])), None)
+    stop = _stop(train)
     if stop is None or not stop.z < train.sensor.z:
         return {"pitch": _length(pitch), "focal_length": _length(train.sensor.z / 20 or 1e-3)}
     focal_length = pitch * (train.sensor.z - stop.z) / min(stop.opening)
@@ -284,13 +282,14 @@ def free_name(wanted: str, names: AbstractSet[str]) -> str:
 
 def _width_at(train: Train, z: float) -> float:
     """Estimated width of the beam at a position between the first opening and the sensor, metres."""
-    widths = [2 * half for half in _first_opening(train)] or [min(train.sensor.size)]
+    stop, last = _stop(train), min(train.sensor.size)
     share = min(max(z / train.sensor.z, 0.0), 1.0) if train.sensor.z > 0 else 1.0
-    return float((1 - share) * widths[0] + share * min(train.sensor.size))
+    return float((1 - share) * (last if stop is None else stop.opening[0]) + share * last)
 
 
-def _first_opening(train: Train) -> list[float]:
-    return [stage.opening[0] / 2 for stage in train.stages if np.isfinite(stage.opening[0])][:1]
+def _stop(train: Train) -> Stage | None:
+    """The first stage with a rim."""
+    return next((stage for stage in train.stages if np.isfinite(stage.opening[0])), None)
 
 
 def _length(value: float, digits: int = 3) -> str:
