@@ -146,7 +146,7 @@ def _with_warnings(work: Callable[..., Result], *given: Any) -> tuple[Result, li
 
 
 def _answer(decoded: Decoded, distance: float, train: Train, light_field: LightField) -> Json:
-    """What is said of decoded views; the range of distances is that of the scene and the distance in focus."""
+    """The answer about decoded views; the range of distances is that of the scene and the distance in focus."""
     focus = _focus(train)
     ends = [each for each in scene_distances(light_field.grid).values() if each > 0]
     every = [*(ends or [focus / AROUND_FOCUS if math.isfinite(focus) else 1.0, math.inf]), focus, distance]
