@@ -366,7 +366,6 @@ def test_pictures_of_each_kind_of_element_are_taken_away_as_the_library_makes_th
             image.save(expected, format="png", exposure=1 / white)
         assert Path(taken.value.path()).read_bytes() == expected.getvalue(), kind
         page.button("Undo").click()
-        page.settle()
 
 
 def test_neighbours_trade_places_by_their_buttons(page):
