@@ -29,7 +29,7 @@ def test_computed_once_for_each_object_or_preset():
 def test_one_object_is_computed_while_another_waits_for_it():
     # As two benches that take turns do: with a lock for all objects neither would ever go on.
     done = threading.Event()
-    waiting = Thing(lambda: done.wait(20))
+    waiting = Thing(lambda: done.wait(60))
     thread = threading.Thread(target=lambda: waiting.value)
     thread.start()
     assert Thing(lambda: done.set() or 1).value == 1

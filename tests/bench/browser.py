@@ -21,6 +21,15 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PATIENCE = 60_000
 """Milliseconds: what is awaited comes within some hundred, or later where kernels are to be compiled first."""
 
+DRAWN = """
+    const { bench } = document.querySelector("vcc-bench")
+    const frame = () => new Promise(requestAnimationFrame)
+    await frame()
+    while (bench.together) await bench.together
+    await frame()
+"""
+"""JavaScript: wait until the views, which await a picture that is under way, are drawn."""
+
 CAMERA = {
     "elements": [
         {"kind": "lens", "name": "main", "z": "0 mm", "focal_length": "50 mm", "diameter": "18 mm"},
@@ -88,7 +97,7 @@ class Served:
     def stop(self) -> None:
         """End, with all connections."""
         self._server.should_exit = True
-        self._thread.join(10)
+        self._thread.join(60)
         self._socket.close()
 
     @property
@@ -127,8 +136,26 @@ class Page:
         self.settle()
 
     def settle(self):
-        """Wait until the picture of what was asked last is there."""
+        """Wait until the picture of what was asked last is there, and all views are drawn."""
         self.page.wait_for_selector('section.picture[aria-busy="false"]')
+        self.drawn()
+
+    def until(self, read, wanted):
+        """Read again and again, each time at one instant, until it is what is wanted: a value, or a judge of values."""
+        for _ in range(PATIENCE // 25):
+            found = read()
+            if wanted(found) if callable(wanted) else found == wanted:
+                return found
+            self.page.wait_for_timeout(25)
+        raise AssertionError(f"after {PATIENCE / 1000:g} s it is still {found!r}")
+
+    def drawn(self):
+        """Wait until what the hand did last is drawn."""
+        self.page.evaluate(f"async () => {{ {DRAWN} }}")
+
+    def after(self, milliseconds):
+        """Wait in the page: timers that were set there before, and for less, have come whatever delays them."""
+        self.page.evaluate("pause => new Promise((later) => setTimeout(later, pause))", milliseconds)
 
     def part(self, name):
         """An element or the sensor on the bench, by its number or its name."""
@@ -145,12 +172,9 @@ class Page:
     def pulled(self, name):
         """Where it stands and what pulled it there, in words, once what the hand did last is drawn."""
         place, words = self.part(name).evaluate(
-            """async part => {
-                const { bench } = document.querySelector("vcc-bench")
-                const frame = () => new Promise(requestAnimationFrame)
-                await frame()
-                while (bench.together) await bench.together
-                await frame()
+            "async part => {"
+            + DRAWN
+            + """
                 const words = part.getRootNode().querySelector(".snap.held text")?.textContent ?? null
                 return [part.getAttribute("aria-valuetext"), words]
             }"""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.bench.browser import chromium
+from tests.bench.browser import PATIENCE, chromium
 from vcc.bench.server import static_files
 
 PAGE = """<!doctype html><body style="font: italic 30px serif; letter-spacing: 4px; background: #fff; color: #000">
@@ -80,7 +80,7 @@ HOST = """async () => {
 def host():
     with chromium() as browser:
         shown = browser.new_page(viewport={"width": 900, "height": 1700}, color_scheme="dark")
-        shown.set_default_timeout(10_000)
+        shown.set_default_timeout(PATIENCE)
         bundle = static_files()["bench.js"]
         shown.route("http://host/", lambda route: route.fulfill(body=PAGE, content_type="text/html"))
         shown.route(

@@ -22,7 +22,7 @@ def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
     page.page.mouse.move(x, y)
     page.page.mouse.down()
     page.page.mouse.move(x - 40, y, steps=4)
-    page.page.wait_for_timeout(100)  # the drawing follows within 50
+    page.drawn()
     dragged = page.place("sensor")
     assert 44 < float(dragged.removesuffix(" mm")) < 50
     page.page.mouse.up()
@@ -32,7 +32,7 @@ def test_sensor_is_dragged_and_picture_follows_and_undo_takes_it_back(page):
     page.page.keyboard.press("Control+z")
     page.wait_for_place("sensor", "52 mm")
     page.settle()
-    assert page.button("Undo").is_disabled()  # all of the drag was one step
+    page.until(page.button("Undo").is_disabled, True)  # all of the drag was one step
     page.page.keyboard.press("Control+Shift+z")
     page.wait_for_place("sensor", dragged)
 
@@ -70,7 +70,7 @@ def test_what_is_too_large_to_be_sent_is_named_and_the_bench_goes_on(page):
     assert "leaf.png has 33.5 MiB, and a bench takes up to 32 MiB" in words[0]
     assert "The camera of this page has 32.0 MiB" in words[1]
     page.settle()
-    assert page.page.locator(".toast.error").count() == 1
+    page.until(page.page.locator(".toast.error").count, 1)
     # The connection stands: the server answers what follows, and has the camera of before.
     assert page.page.evaluate("document.querySelector('vcc-bench').bench.open")
     page.page.evaluate("document.querySelector('vcc-bench').bench.set(['sensor', 'z'], '51 mm')")
@@ -114,13 +114,13 @@ def test_arrow_keys_step_and_those_that_follow_one_another_are_one_movement(page
     ):
         page.page.keyboard.press(key)
         page.wait_for_place("sensor", place)
-    page.page.wait_for_timeout(700)  # longer than the pause that ends a movement
+    page.after(700)  # longer than the pause that ends a movement
     page.part("sensor").evaluate(
         "part => { for (let n = 0; n < 3; n++)"
         " part.dispatchEvent(new KeyboardEvent('keydown', { key: 'ArrowRight', bubbles: true })) }"
     )
     page.wait_for_place("sensor", "53.29 mm")
-    page.page.wait_for_timeout(700)
+    page.after(700)
     page.settle()
     page.button("Undo").click()
     page.wait_for_place("sensor", "52.99 mm")
@@ -138,7 +138,7 @@ def test_arrow_keys_in_a_field_are_one_movement_and_escape_takes_it_back(page):
             await new Promise((later) => setTimeout(later, 600));
         }"""
     )
-    assert page.place("sensor") == "64.1 mm"
+    page.wait_for_place("sensor", "64.1 mm")
     page.settle()
     page.button("Undo").click()
     page.wait_for_place("sensor", "52 mm")
@@ -146,9 +146,10 @@ def test_arrow_keys_in_a_field_are_one_movement_and_escape_takes_it_back(page):
     page.wait_for_place("sensor", "53 mm")
     field.press("Escape")
     page.wait_for_place("sensor", "52 mm")
-    page.page.wait_for_timeout(600)
+    page.after(600)
+    page.settle()
     assert page.place("sensor") == "52 mm"
-    assert page.button("Undo").is_disabled()
+    page.until(page.button("Undo").is_disabled, True)
 
 
 def focused(page):
@@ -194,12 +195,12 @@ def test_places_are_typed_with_their_units_and_what_is_no_length_is_refused_at_i
         page.wait_for_place("sensor", place)
     page.page.locator("#sensor-z").fill("far")
     page.page.keyboard.press("Enter")
-    assert "not a length" in page.page.get_by_role("alert").text_content()
+    page.page.get_by_role("alert").get_by_text("not a length").wait_for()
     assert page.place("sensor") == "48.5 mm"
     field = page.page.locator("#sensor-z")
-    assert field.input_value() == "4.85"  # as it was typed, and its unit behind it
+    page.until(field.input_value, "4.85")  # as it was typed, and its unit behind it
     unit = page.page.locator("#sensor-z + .unit")
-    assert unit.text_content() == "cm"
+    page.until(unit.text_content, "cm")
     for typed, said in (("1e400", "a finite number"), ("1e400 mm", "a finite number"), ("53 kg", "not a length")):
         field.fill(typed)
         page.page.keyboard.press("Enter")
@@ -210,11 +211,11 @@ def test_places_are_typed_with_their_units_and_what_is_no_length_is_refused_at_i
     field.fill("52.5 mm")
     page.page.keyboard.press("Enter")
     page.wait_for_place("sensor", "52.5 mm")
-    assert unit.text_content() == "mm"
+    page.until(unit.text_content, "mm")
     page.page.locator("#sensor-decentre").fill("0.5, 0")
     page.page.keyboard.press("Enter")
     page.settle()
-    assert page.page.locator("#sensor-decentre").input_value() == "0.5 mm, 0 mm"  # not metres
+    page.until(page.page.locator("#sensor-decentre").input_value, "0.5 mm, 0 mm")  # not metres
 
 
 def test_elements_are_added_edited_and_removed(page):
@@ -230,12 +231,13 @@ def test_elements_are_added_edited_and_removed(page):
     page.page.get_by_role("tab", name="mask code").click()
     page.page.locator(".grid i").first.click()  # a cell of the drawn pattern
     page.settle()
-    assert page.page.locator("#elements-1-pattern-cells").input_value().split() == ["0", "0", "0", "1"]
+    page.until(
+        page.page.locator("#elements-1-pattern-cells").input_value,
+        lambda cells: cells.split() == ["0", "0", "0", "1"],
+    )
     page.page.get_by_label("Add an element").select_option("achromat-100mm")
     surfaces = page.page.get_by_role("region", name="surfaces").locator("tr")
-    surfaces.first.wait_for()
-    assert surfaces.count() == 4  # their names, and three
-    assert "{" not in surfaces.nth(1).text_content()
+    page.until(surfaces.all_text_contents, lambda rows: len(rows) == 4 and "{" not in rows[1])  # names, and three
 
 
 def test_address_holds_the_camera_for_another_window_and_for_a_reload(page, browser, served):
@@ -268,7 +270,7 @@ def test_server_goes_and_comes_back_and_the_camera_is_still_there(page, served):
     served.start()
     page.page.get_by_text("The server is gone").wait_for(state="detached")
     page.settle()
-    assert page.place("sensor") == "51.25 mm"
+    page.wait_for_place("sensor", "51.25 mm")
 
 
 def test_connection_breaks_and_steps_and_pinned_picture_are_still_there(page, served):
@@ -277,12 +279,12 @@ def test_connection_breaks_and_steps_and_pinned_picture_are_still_there(page, se
     page.page.locator("#sensor-z").fill("51.5 mm")
     page.page.keyboard.press("Enter")
     page.settle()
-    said = page.page.get_by_text("dB").text_content()
+    (said,) = page.until(page.page.get_by_text("dB").all_text_contents, lambda texts: len(texts) == 1)
     served.break_off()
     page.page.get_by_text("The server is gone").wait_for()
     page.page.get_by_text("The server is gone").wait_for(state="detached")
     page.settle()
-    assert page.page.get_by_text("dB").text_content() == said
+    page.until(page.page.get_by_text("dB").all_text_contents, [said])
     page.button("Undo").click()
     page.wait_for_place("sensor", "52 mm")
     page.page.get_by_text("now · the same").wait_for()
@@ -294,11 +296,10 @@ def test_pinned_picture_is_compared_with(page):
     page.page.locator("#sensor-z").fill("54 mm")
     page.page.keyboard.press("Enter")
     page.page.get_by_text("dB").wait_for()
-    pictures = set()
+    pictures = []
     for mode in ("alone", "beside", "wipe", "difference"):
         page.page.get_by_label("Compare with the pinned picture").select_option(mode)
-        pictures.add(page.picture())
-    assert len(pictures) == 4
+        pictures.append(page.until(page.picture, lambda shown: shown not in pictures))
 
 
 def test_camera_and_film_are_taken_away(page):
@@ -370,11 +371,11 @@ def test_pictures_of_each_kind_of_element_are_taken_away_as_the_library_makes_th
 
 def test_neighbours_trade_places_by_their_buttons(page):
     page.page.get_by_role("tab", name="mask code").click()
-    assert page.button("Move behind the one behind it").is_disabled()
+    page.until(page.button("Move behind the one behind it").is_disabled, True)
     page.button("Move before the one before it").click()
     page.wait_for_place(1, "0 mm")
     assert page.place(0) == "26 mm"
-    assert page.button("Move before the one before it").is_disabled()
+    page.until(page.button("Move before the one before it").is_disabled, True)
     page.button("Undo").click()
     page.wait_for_place(1, "26 mm")
     assert page.place(0) == "0 mm"
@@ -385,6 +386,7 @@ def test_click_focuses_where_it_was_clicked(page):
     box = page.page.locator("canvas").bounding_box()
     page.page.mouse.click(box["x"] + box["width"] * 0.05, box["y"] + box["height"] / 2)  # near leaves
     page.page.wait_for_selector('button[aria-label="Undo"]:not([disabled])')
+    page.settle()
     assert 52.5 < float(page.place("sensor").removesuffix(" mm")) < 54
 
 
@@ -435,7 +437,7 @@ def decoded_and_refocused(page):
     before = refocused.get_attribute("src")
     slider = page.page.get_by_role("slider", name="Refocused")
     slider.press("End")
-    assert slider.get_attribute("aria-valuetext") == "at 3 m"
+    page.until(lambda: slider.get_attribute("aria-valuetext"), "at 3 m")
     page.page.get_by_role("img", name="Picture refocused on what is at 3 m").wait_for()
     assert refocused.get_attribute("src") != before
     page.button("as the camera is").click()
@@ -445,8 +447,7 @@ def decoded_and_refocused(page):
 def test_phase_space_is_shown_at_any_plane_and_follows_the_camera(page):
     page.page.get_by_role("tab", name="Phase space").click()
     figures = page.page.locator("#pane figure")
-    figures.nth(3).wait_for()
-    assert figures.count() == 4
+    page.until(figures.count, 4)
     field = page.page.get_by_label("plane at")
     field.fill("30")
     field.press("Enter")
@@ -455,11 +456,11 @@ def test_phase_space_is_shown_at_any_plane_and_follows_the_camera(page):
     slider.focus()
     page.page.keyboard.press("End")
     page.page.get_by_text("z = 52 mm", exact=True).wait_for()
-    assert figures.count() == 1
+    page.until(figures.count, 1)
     page.part("sensor").focus()
     page.page.keyboard.press("Shift+ArrowLeft")
     page.page.get_by_text("z = 51 mm", exact=True).wait_for()
-    assert field.input_value() == "51 mm"
+    page.until(field.input_value, "51 mm")
     page.button("Each plane").click()
     figures.nth(3).wait_for()
 
@@ -480,9 +481,10 @@ def test_light_field_is_moved_by_its_handle_and_typed_and_stays_in_the_address(p
     assert page.picture() != before
     field = page.page.get_by_label("decentre", exact=True)  # the light field's: it is selected
     field.fill("1 mm, 0 mm")
+    written = page.page.url
     field.press("Enter")
     page.settle()
-    page.page.wait_for_timeout(600)  # until the address is written
+    page.page.wait_for_url(lambda address: address != written)  # it is written when the bench rests
     again = Page(page.context.browser, page.page.url)
     assert again.place("light field") == dragged
     again.close()

@@ -1,7 +1,6 @@
 """What one expects of a viewer of pictures, and comparing many: the bench in headless Chromium."""
 
 import io
-import itertools
 
 import numpy as np
 import PIL.Image
@@ -16,20 +15,17 @@ def canvas(page):
 
 def changed(page, before):
     """Wait until the canvas looks different."""
-    for _ in range(100):
-        now = canvas(page)
-        if now.shape != before.shape or np.abs(now - before).max() > 8:
-            return now
-        page.page.wait_for_timeout(50)
-    raise AssertionError("the canvas looks the same")
+    return page.until(
+        lambda: canvas(page), lambda now: now.shape != before.shape or np.abs(now - before).max() > 8
+    )
 
 
 def test_levels_show_what_is_clipped_and_change_black_white_and_channel(page):
     before = canvas(page)
     page.button("Levels").click()
     levels = page.page.locator("vcc-bench-levels")
-    assert levels.locator(".bars").count() == 3
-    assert "above white" in levels.locator(".clipped").text_content()
+    page.until(levels.locator(".bars").count, 3)
+    levels.locator(".clipped").get_by_text("above white").wait_for()
     panel = canvas(page)
     levels.get_by_label("black").first.press("Shift+ArrowRight")
     darker = changed(page, panel)
@@ -40,16 +36,16 @@ def test_levels_show_what_is_clipped_and_change_black_white_and_channel(page):
     levels.get_by_label("linear").check()
     changed(page, red)
     levels.get_by_role("slider", name="white").press("ArrowLeft")
-    page.page.wait_for_timeout(100)
-    page.settle()
-    assert page.page.get_by_label("Fix exposure").is_checked()
+    page.until(page.page.get_by_label("Fix exposure").is_checked, True)
     levels.get_by_label("linear").uncheck()
     levels.get_by_label("Channel").select_option("")
     levels.get_by_role("button", name="Auto").click()
-    page.page.wait_for_timeout(300)
-    page.settle()
     page.button("Levels").click()
-    assert np.abs(canvas(page) - before).mean() < 1
+
+    def as_before(now):
+        return now.shape == before.shape and np.abs(now - before).mean() < 1
+
+    page.until(lambda: canvas(page), as_before)
 
 
 def test_pointer_reads_values_and_the_place_on_the_sensor(page):
@@ -61,10 +57,8 @@ def test_pointer_reads_values_and_the_place_on_the_sensor(page):
     page.page.get_by_role("checkbox", name="Noise").check()
     page.page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + box["height"] / 2)
     reading = page.page.locator(".line [role=status]", has_text="DN")
-    reading.wait_for()
-    assert reading.evaluate(
-        "of => of.scrollWidth <= of.clientWidth && of.scrollHeight <= of.parentElement.clientHeight"
-    )
+    fits = "of => of.scrollWidth <= of.clientWidth && of.scrollHeight <= of.parentElement.clientHeight"
+    page.until(lambda: reading.evaluate_all(f"all => all.map({fits})"), [True])
 
 
 def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):
@@ -76,12 +70,11 @@ def test_profile_along_a_line_is_drawn_by_mouse_and_by_keys(page):
     page.page.mouse.move(x + 100, y, steps=4)
     page.page.mouse.up()
     plot = page.page.get_by_role("img", name="Irradiance along a line of")
-    plot.wait_for()
-    assert plot.locator("path.red").count() == 1
+    page.until(plot.locator("path.red").count, 1)
     words = plot.get_attribute("aria-label")
     page.page.locator("canvas").focus()
     page.page.keyboard.press("p")  # ends
-    assert plot.count() == 0
+    page.until(plot.count, 0)
     page.page.keyboard.press("ArrowRight")
     page.page.keyboard.press("p")
     for _ in range(4):
@@ -114,10 +107,10 @@ def test_pinned_states_are_a_strip_to_compare_with_and_to_return_to(page):
         page.button("Pin").click()
         page.page.get_by_text("now · the same").wait_for()
     pins = page.page.locator("vcc-bench-pins li")
-    assert pins.count() == 3
-    assert "z 54 mm" in pins.nth(2).text_content()
-    assert "compared" in pins.nth(2).text_content()
-    assert "dB" in pins.nth(0).text_content()
+    page.until(
+        pins.all_text_contents,
+        lambda texts: len(texts) == 3 and "z 54 mm" in texts[2] and "compared" in texts[2] and "dB" in texts[0],
+    )
     page.button("Return to pinned state 1: main, code, sensor").click()
     page.wait_for_place("sensor", "51 mm")
     page.settle()
@@ -142,12 +135,10 @@ def test_frames_of_a_sweep_are_gone_through_by_hand(page):
     pictures = [page.picture()]
     for _ in range(4):
         page.page.keyboard.press("ArrowRight")
-        page.page.wait_for_timeout(60)
-        pictures.append(page.picture())
-    assert all(one != other for one, other in itertools.pairwise(pictures))
-    assert slider.get_attribute("aria-valuetext") == "z 53 mm"
+        pictures.append(page.until(page.picture, lambda shown: shown != pictures[-1]))
+    page.until(lambda: slider.get_attribute("aria-valuetext"), "z 53 mm")
     page.page.get_by_role("button", name="Close").click()
-    assert slider.count() == 0
+    page.until(slider.count, 0)
     assert page.place("sensor") == "52 mm"
 
 
@@ -191,6 +182,7 @@ def test_places_in_fields_and_drawing_agree_while_the_server_is_away(page, serve
     page.page.mouse.down()
     page.page.mouse.move(x - 50, y, steps=4)
     page.page.mouse.up()
+    page.drawn()
     drawn = page.place("sensor")
     assert drawn != "52 mm"
     assert page.page.locator("#sensor-z").input_value() == drawn.removesuffix(" mm")
@@ -203,13 +195,14 @@ def test_places_in_fields_and_drawing_agree_while_the_server_is_away(page, serve
     page.page.get_by_text("The server is gone").wait_for(state="detached")
     page.settle()
     # Only what makes no sense is refused, each at its field; all else that was changed meanwhile is kept.
-    assert page.place("sensor") == "52 mm"
-    assert page.page.locator("#sensor-pitch").input_value() == "0.2 mm"
-    assert page.page.locator("#sensor-decentre").input_value() == ""
-    words = [each.text_content() for each in page.page.get_by_role("alert").all()]
-    assert len(words) == 2
-    assert 'z is "far", which is not a length; write it like 50 mm' in words[0]
-    assert "decentre" in words[1]
+    page.wait_for_place("sensor", "52 mm")
+    page.until(page.page.locator("#sensor-pitch").input_value, "0.2 mm")
+    page.until(page.page.locator("#sensor-decentre").input_value, "")
+    refused = 'z is "far", which is not a length; write it like 50 mm'
+    page.until(
+        page.page.get_by_role("alert").all_text_contents,
+        lambda words: len(words) == 2 and refused in words[0] and "decentre" in words[1],
+    )
 
 
 def test_page_without_the_token_says_what_is_missing_and_does_not_try_for_ever(browser, served):
@@ -219,7 +212,7 @@ def test_page_without_the_token_says_what_is_missing_and_does_not_try_for_ever(b
     page.on("websocket", lambda socket: opened.append(socket))
     page.goto(served.address.partition("?")[0])
     page.get_by_text("This address lacks the token of the bench").wait_for()
-    page.wait_for_timeout(1500)
+    page.evaluate("new Promise((later) => setTimeout(later, 1500))")  # thrice what it waits for a second try
     assert len(opened) == 1
     context.close()
 
@@ -245,10 +238,8 @@ def test_presets_have_pictures_and_open(browser):
     page = Page(browser, bench.address)
     page.page.get_by_text("Open", exact=True).click()
     pictures = page.page.locator(".preset img")
-    assert pictures.count() == 6
-    assert pictures.evaluate_all("all => all.every(each => each.naturalWidth >= 100)")
+    page.until(lambda: pictures.evaluate_all("all => all.map(each => each.naturalWidth >= 100)"), [True] * 6)
     page.page.locator(".preset").nth(1).click()
-    page.part("1").wait_for()
-    assert page.place("1") == "0 mm"
+    page.wait_for_place("1", "0 mm")
     page.close()
     bench.stop()

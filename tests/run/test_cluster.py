@@ -165,8 +165,9 @@ def test_work_whose_scheduler_is_lost_ends_with_an_error_and_ctrl_c_cancels(ends
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
         ) as cluster,
-        distributed.Client(cluster.scheduler_address, set_as_default=False, timeout=0.1) as client,
+        distributed.Client(cluster.scheduler_address, set_as_default=False) as client,
     ):
+        client._timeout = 0.1  # once connected: how long it looks for a scheduler that is lost
 
         def told(number):
             if ends == "interrupt":
@@ -199,8 +200,9 @@ def test_a_sweep_whose_scheduler_is_lost_says_what_is_kept_and_goes_on(stored, t
         distributed.LocalCluster(
             n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
         ) as cluster,
-        distributed.Client(cluster.scheduler_address, set_as_default=False, timeout=0.1) as client,
+        distributed.Client(cluster.scheduler_address, set_as_default=False) as client,
     ):
+        client._timeout = 0.1  # once connected: how long it looks for a scheduler that is lost
 
         def progress(done, total):
             if done == 2:
