@@ -141,7 +141,7 @@ class Page:
         self.drawn()
 
     def until(self, read, wanted):
-        """Read again and again, each time at one instant, until it is what is wanted: a value, or a judge of values."""
+        """Read again and again, each time at one instant, until it is the value, or fulfils the condition."""
         for _ in range(PATIENCE // 25):
             found = read()
             if wanted(found) if callable(wanted) else found == wanted:
