@@ -1,5 +1,7 @@
 """Threads let go of their work when somebody interrupts."""
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -49,3 +51,22 @@ def test_without_either_all_is_done() -> None:
     with Workers(2) as pool:
         assert list(pool.map(abs, [-1, -2, -3])) == [1, 2, 3]
     assert not pool.ended[0]
+
+
+ENDING = """
+import threading, time
+from concurrent.futures import ThreadPoolExecutor
+from vcc.base.workers import program_ends
+assert not program_ends()
+def wait():
+    while not program_ends():
+        time.sleep(0.01)
+    print("told", flush=True)
+ThreadPoolExecutor(1).submit(wait)
+"""
+
+
+def test_a_thread_is_told_that_the_program_ends() -> None:
+    """Python waits for what pools have at work, while its main thread is alive, and takes nothing new."""
+    done = subprocess.run([sys.executable, "-c", ENDING], capture_output=True, text=True, check=True)
+    assert done.stdout == "told\n"

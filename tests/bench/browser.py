@@ -97,7 +97,7 @@ class Served:
     def stop(self) -> None:
         """End, with all connections."""
         self._server.should_exit = True
-        self._thread.join(60)
+        self._thread.join(300)
         self._socket.close()
 
     @property

@@ -64,7 +64,7 @@ class Client:
         """Say something."""
         self.session.receive({"do": doing, **more})
 
-    def until(self, *kinds: str, seconds: float = 60) -> tuple[dict, list[bytes]]:
+    def until(self, *kinds: str, seconds: float = 300) -> tuple[dict, list[bytes]]:
         """What is told next of these kinds; what comes before is taken away."""
 
         def found() -> int | None:
@@ -82,10 +82,11 @@ class Client:
         """The message of the next whole picture at rest."""
         while True:
             message, _ = self.until("picture", "no picture", "refused", "failed")
-            if message["is"] != "picture" or not (message["coarse"] or message["moving"]):
+            remark = message["is"] == "refused" and message.get("done", False)
+            if not remark and (message["is"] != "picture" or not (message["coarse"] or message["moving"])):
                 return message
 
     def close(self) -> None:
         """Go."""
         self.session.close()
-        assert self.session.join(30)
+        assert self.session.join(300)

@@ -245,7 +245,7 @@ def test_of_what_moves_only_the_newest_counts(client):
 
 def wait_until_taken(client, value):
     """Until the session has taken a place of the sensor: during a drag, the state follows the picture."""
-    end = time.monotonic() + 60
+    end = time.monotonic() + 300
     while client.session.document.camera["sensor"]["z"] != value:
         assert time.monotonic() < end
         time.sleep(0.001)
@@ -446,7 +446,7 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     client.do("hello", turn=1)
     client.at_rest()
     client.until("notes")
-    assert client.session.join(30)
+    assert client.session.join(300)
     levels = [FULL, WHOLE, *(each for each in COARSER if each.rays != 4 or each.pixels != 2)]  # a plan has no rays
     away = 0.052 * 13 / 12
     assert made[-2 * len(levels) :] == [(each, pytest.approx(z)) for z in (away, 0.052) for each in levels]
@@ -455,14 +455,14 @@ def test_at_rest_a_camera_is_rehearsed_for_a_drag_and_nobody_sees_it(monkeypatch
     del made[:]
     client.do("set", where=["elements", 1, "z"], value="30 mm", moving=False, turn=2)
     client.at_rest()
-    assert client.session.join(30)
+    assert client.session.join(300)
     assert made == [(WHOLE, pytest.approx(0.052))]
     # by rays what is out of focus is made as all else is, and a whole picture has compiled all
     del made[:]
     lenslets = {"kind": "lens_array", "z": "50 mm", "pitch": "2 mm", "focal_length": "20 mm"}
     client.do("set", where=["elements", 1], value=lenslets, turn=3)
     client.at_rest()
-    assert client.session.join(30)
+    assert client.session.join(300)
     assert made == [(each, pytest.approx(0.052)) for each in (WHOLE, FULL, *COARSER)]
     client.close()
 
@@ -480,7 +480,7 @@ def test_a_hand_that_rests_gets_the_whole_picture_and_letting_go_shows_it_again_
     client = Client()
     client.do("hello")
     client.at_rest()
-    assert client.session.join(30)
+    assert client.session.join(300)
     monkeypatch.setattr(imaging_there, "take", coarse_while_moving)
     client.do("set", where=["sensor", "z"], value="53 mm", moving=True, turn=1)
     coarse, _ = client.until("picture")
@@ -641,6 +641,26 @@ def test_glass_gets_wavelengths_by_itself_and_each_band_its_own_picture(client):
     assert "for the design wavelength" in client.until("answer")[0]["remark"]
     client.do("set", where=["wavelengths"], value=["610 nm"], turn=3)
     assert "wavelengths" in client.until("refused")[0]["words"]
+
+
+def test_a_program_asked_for_while_a_coarse_picture_is_shown_has_the_white_of_the_whole_one(monkeypatch):
+    client, asked = Client(), []
+
+    def noted(train, field, document, fineness, progress, kept):
+        if not asked:
+            asked.append(client.do("export", what="python"))
+        return take(train, field, document, fineness, progress, kept)
+
+    monkeypatch.setattr(imaging_there, "take", noted)
+    monkeypatch.setattr(imaging_there.Pace, "fineness", lambda pace, of: COARSER[0])
+    client.do("hello")
+    coarse, _ = client.until("picture")
+    _, (program,) = client.until("file")
+    whole = client.at_rest()
+    assert coarse["coarse"]
+    assert coarse["white"] != whole["white"]
+    assert f"exposure=1 / {whole['white']!r})" in program.decode()
+    client.close()
 
 
 @pytest.mark.parametrize("name", ["glass", "photodiodes"])
@@ -1053,5 +1073,5 @@ def test_thread_is_there_while_there_is_work(monkeypatch):
     for turn in (1, 2):
         client.do("hello", turn=turn)
         assert client.at_rest()["turn"] == turn
-        assert client.session.join(30)
+        assert client.session.join(300)
     client.close()

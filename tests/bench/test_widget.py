@@ -83,4 +83,4 @@ def test_a_widget_speaks_as_any_client(monkeypatch):
         "run this cell again" in shown._repr_mimebundle_()[0]["text/plain"]
     )  # where a notebook is read without Python
     shown._handle_custom_msg({"do": "format"}, [])
-    assert shown._session.join(30)
+    assert shown._session.join(300)

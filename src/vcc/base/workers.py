@@ -52,6 +52,16 @@ class Workers(ThreadPoolExecutor):
         return False
 
 
+def program_ends() -> bool:
+    """Whether Python is shutting down: from then on no pool of threads accepts work, which is a `RuntimeError`."""
+    with ThreadPoolExecutor(1) as pool:
+        try:
+            pool.submit(int)
+        except RuntimeError:
+            return True
+    return False
+
+
 def uninterrupted(
     work: Callable[..., Result], /, *given: Any, end: Callable[[BaseException], object] | None = None
 ) -> Result:

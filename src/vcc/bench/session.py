@@ -20,6 +20,7 @@ import numpy as np
 
 from vcc.base import units
 from vcc.base.errors import InputError
+from vcc.base.workers import program_ends
 from vcc.bench import additions, answers, decoded, export, screen
 from vcc.bench.aperture import drawn_aperture
 from vcc.bench.document import Document
@@ -168,8 +169,8 @@ class Session:
             except Superseded:
                 continue
             except Exception as error:  # a bug: the client is notified, and the bench goes on
-                if not threading.main_thread().is_alive():
-                    return  # the program ends, and pools of threads with it
+                if program_ends():
+                    return
                 log.exception("a fault on the bench")
                 self._wanted = None
                 self._tell("failed", {"words": f"a bug in the program: {type(error).__name__}: {error}"})
@@ -459,7 +460,7 @@ class Session:
 
     def _do_pin(self, _: Json) -> None:
         self._finish()
-        self._pins.add(self.document, self._imaging.whole().values, self._white)
+        self._pins.add(self.document, self._whole().values, self._white)
         self._tell_pins()
 
     def _do_unpin(self, message: Json) -> None:
@@ -528,13 +529,20 @@ class Session:
             frames = [screen.codes(each, self._white) for each in self._swept(sweep.documents)]
             name, kind, data = sweep.film(frames)
         else:
-            taken = self._imaging.whole() if what in ("png", "exr") else None
+            taken = None if what == "toml" or self._imaging.taken is None else self._whole()
             name, kind, data = export.exported(what, self._editing, taken, self._white)
         self._tell("file", {"name": name, "type": kind}, [data])
 
+    def _whole(self) -> Taken:
+        """The whole image of the document; unless the exposure is stated, its own level is white from now on."""
+        taken = self._imaging.whole()
+        if self.document.exposure is None:
+            self._white = screen.white_of(self._displayed(taken))
+        return taken
+
     def _swept(self, documents: Sequence[Document]) -> Any:
         """Whole images of documents, one at a time, with progress; all with the white level of the present one."""
-        self._imaging.whole()
+        self._whole()
         for number, document in enumerate(documents):
             self._tell("progress", {"done": number, "total": len(documents), "words": "Making the film"})
             checked, described = self._editing.checked(document)
