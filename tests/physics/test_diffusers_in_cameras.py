@@ -45,6 +45,8 @@ D = 1 / (1 / F - 1 / FOCUS)
 VIEWS, SPACING, SLOPE, PIXELS, DISPARITY = 16, 1 * mm, 1e-3, 96, 0.5
 DIAMETER = 12 * mm
 PICTURE = vcc.Sensor(z=D, shape=(14, 16), pitch=2.4 * D * SLOPE)
+TRACED = replace(PICTURE, shape=(11, 12))
+"""What the tracer sees."""
 LENS = vcc.Lens(focal_length=F, diameter=DIAMETER)
 ROUND = Thin(0.0, bend=lens(F), share=disc(DIAMETER))
 RAYS = 56
@@ -127,9 +129,8 @@ def test_a_diffuser_conserves_light(rule, kernel):
     assert blurred.values.max() < 0.8 * without.values.max()  # it did scatter
 
 
-@pytest.mark.parametrize("kernel", [KERNELS["gaussian"], KERNELS["array"]], ids=["gaussian", "array"])
-def test_rays_through_a_diffuser_conserve_light(kernel):
-    lf, camera = in_focus(BLOB), vcc.Camera(RULES["blur of each view"](kernel), WIDE)
+def test_rays_through_a_diffuser_conserve_light():
+    lf, camera = in_focus(BLOB), vcc.Camera(RULES["blur of each view"](KERNELS["array"]), WIDE)
     blurred = camera.capture(lf)
     rays = [camera.capture(lf, method="rays", samples=128, seed=seed) for seed in range(8)]
     assert all(one.sampling_error < 0.02 * one.values.max() for one in rays)
@@ -254,8 +255,17 @@ def spot(method: str) -> vcc.Image:
     return capture([LENS], in_focus(BLOB), WIDE, **METHODS[method])
 
 
-@pytest.mark.parametrize("name", ["disc", "square", "array"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [
+        ("auto", "disc"),
+        ("auto", "square"),
+        ("auto", "array"),
+        ("linear", "square"),
+        ("rays", "disc"),
+        ("rays", "array"),
+    ],
+)
 def test_moments_of_a_blurred_spot_are_those_of_the_kernel(name, method):
     kernel = KERNELS[name]
     diffuser = vcc.Diffuser(kernel=kernel, z=0.1 * D)
@@ -387,10 +397,10 @@ def compare(image: vcc.Image, truth: np.ndarray, noise: float, floor: float = LI
 @pytest.mark.parametrize("case", CASES)
 def test_diffusers_and_masks_match_brute_force(case):
     pairs, spread = CASES[case]
-    camera = vcc.Camera([LENS, *(one for one, _ in pairs)], PICTURE)
+    camera = vcc.Camera([LENS, *(one for one, _ in pairs)], TRACED)
     image = camera.capture(PLANES.light_field, method="rays", samples=8192)
     half = DIAMETER / 2 + spread * D
-    bench = Bench([ROUND, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
+    bench = Bench([ROUND, *(thin for _, thin in pairs)], D, TRACED.shape, TRACED.pitch, (0.0, half, half))
     compare(image, *bench.measured(SCENE, RAYS))
 
 
@@ -405,10 +415,10 @@ AS_BLURS = {
 def test_rules_match_brute_force(rule):
     """The stop is square, on borders of views' cells: footprints take cut cells as lit from their middle."""
     pairs, spread = AS_BLURS[rule]
-    camera = vcc.Camera([vcc.Lens(focal_length=F), STOP, *(one for one, _ in pairs)], PICTURE)
+    camera = vcc.Camera([vcc.Lens(focal_length=F), STOP, *(one for one, _ in pairs)], TRACED)
     assert any(rule in note for note in camera.compile(PLANES.light_field).notes)
     half = DIAMETER / 2 + spread * D
-    bench = Bench([SQUARE_STOP, *(thin for _, thin in pairs)], D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
+    bench = Bench([SQUARE_STOP, *(thin for _, thin in pairs)], D, TRACED.shape, TRACED.pitch, (0.0, half, half))
     truth, noise = bench.measured(SCENE, RAYS)
     # What footprints leave besides is second order in cells of views and in samples (test_masks: over 55 dB).
     floor = 10 ** (-55 / 20)

@@ -22,7 +22,7 @@ from vcc.plan.rays.points import SCRAMBLES, TABLE, table
 pytestmark = pytest.mark.filterwarnings("ignore:.*not in the light field.*:vcc.errors.ResultWarning")
 
 FOCUS = 1 / (1 / 50e-3 - 1)
-PIXELS, MANY = 16, 2**13
+PIXELS, MANY = 12, 2**13
 
 
 def case(seed: int) -> tuple[vcc.Camera, vcc.LightField]:

@@ -16,7 +16,7 @@ from tests.physics.brute_force import Layer, Scene, ThinLensCamera, cosines, psn
 from vcc.base.units import m, mm
 
 FOCAL_LENGTH, SPACING, SLOPE, FOCUS = 50 * mm, 1 * mm, 1e-3, 1 * m
-VIEWS, PIXELS, SENSOR = 7, 76, 28
+VIEWS, PIXELS, SENSOR = 7, 76, 22
 DIAMETER = 6 * mm
 MEANS = 5
 """Rays a pixel, each way, whose mean a sample is: cameras' pixels, so that borders are soft as theirs."""
