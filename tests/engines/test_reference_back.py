@@ -54,14 +54,13 @@ def assert_adjoint(core: Footprints) -> None:
 
 @pytest.mark.parametrize("kind", AFFINE)
 def test_samples_of_random_cameras_are_the_adjoint(kind):
-    for seed in range(2):
-        case = drawn(kind, seed, 6, 3)
-        assert_adjoint(case.camera.compile(case.light_field, refine=1 + seed % 2).core)
+    case = drawn(kind, 0, 6, 3)
+    assert_adjoint(case.camera.compile(case.light_field, refine=1 + AFFINE.index(kind) % 2).core)
 
 
-@pytest.mark.parametrize("interpolation", ["nearest", "linear", "cubic", "sharp"])
 @pytest.mark.parametrize("name", list(CAMERAS))
-def test_samples_are_the_adjoint(name, interpolation):
+def test_samples_are_the_adjoint(name):
+    interpolation = ("nearest", "linear", "cubic", "sharp")[list(CAMERAS).index(name) % 4]
     options = {"interpolation": interpolation, "between_views": "none", "refine": 1}
     assert_adjoint(CAMERAS[name].compile(field(samples(SMALL)), **options).core)
 
