@@ -87,9 +87,11 @@ def test_the_cameras_here_do_what_their_names_say(light_field):
     assert plans["mask just behind the lens"].core.masks
 
 
-@pytest.mark.parametrize("axis", range(4), ids=["v", "u", "t", "s"])
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize(
+    ("name", "axis"), [(name, axis) for n, name in enumerate(CAMERAS) for axis in (n % 2, 2 + (n + n // 2) % 2)]
+)
 def test_single_slices_along_an_axis_add_up(light_field, name, axis):
+    """Each camera along an axis of views and one of pixels; each axis with four cameras."""
     # Single ones at both ends, where footprints and filters are cut off on one side, and in the middle; the rest
     # in one piece.
     places = {0, 1, SHAPE[axis] // 2, SHAPE[axis] // 2 + 1, SHAPE[axis] - 1}

@@ -179,8 +179,9 @@ def sector(x, y, turn):
 @pytest.mark.parametrize("case", PLATES)
 def test_plates_and_facets_match_brute_force(case):
     elements, thins, half = PLATES[case]
-    image = rays(elements, samples=8192)
-    bench = Bench(thins, D, PICTURE.shape, PICTURE.pitch, (0.0, half, half))
+    sensor = replace(PICTURE, shape=(11, 12))
+    image = rays(elements, sensor=sensor, samples=8192)
+    bench = Bench(thins, D, sensor.shape, sensor.pitch, (0.0, half, half))
     compare(image, *bench.measured(SCENE, 56))
 
 
@@ -241,7 +242,7 @@ DELTA = 12e-3
 SPLIT = vcc.Sensor(z=D, shape=(60, 60), pitch=D * SLOPE)
 
 
-@pytest.mark.parametrize("distance", [0.6, 0.8, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("distance", [0.6, 1.0, 3.0])
 def test_a_biprism_at_the_lens_shows_a_point_twice(distance):
     # Each half of the lens shows the point δ·d to its side, at every depth.
     sensor = replace(SPLIT, z=1 / (1 / F - 1 / distance))
@@ -288,7 +289,7 @@ def shown(distance: float, z: float) -> float:
     return (DELTA * distance + over_spot(lambda place: place) / over_spot(lambda place: 1.0)) * d / (distance + z)
 
 
-@pytest.mark.parametrize(("distance", "turn"), [(0.6, 0.0), (0.9, 0.7), (1.4, -1.2), (2.5, 0.3)])
+@pytest.mark.parametrize(("distance", "turn"), [(0.6, 0.0), (1.4, -1.2)])
 def test_a_biprism_before_the_lens_shows_a_point_twice(distance, turn):
     z = 20 * mm
     sensor = replace(SPLIT, z=z + 1 / (1 / F - 1 / (distance + z)))
@@ -327,7 +328,7 @@ NOISY = {
 @cache
 def settled(case: str) -> np.ndarray:
     """Two pictures of very many rays, their mean, in double precision."""
-    both = [rays(NOISY[case], samples=32768, seed=seed).values.astype(np.float64) for seed in (100, 101)]
+    both = [rays(NOISY[case], samples=16384, seed=seed).values.astype(np.float64) for seed in (100, 101)]
     return (both[0] + both[1]) / 2
 
 
