@@ -120,7 +120,9 @@ def test_blocks_add_up_to_the_whole(tmp_path, monkeypatch, name, engine):
     whole = back(plan, given, weights, how, wanted=wanted)
     # Samples of a block are kept in single precision; what 8 bits are blurred to is rounded to it, 6e-8.
     largest = 1e-6 if engine == "reference" else 2e-5
-    for sizes in CUTS.values():
+    # Blocks are cut before any engine sees them: the reference, which is slow, has one cut of each plan.
+    some = list(CUTS.values())
+    for sizes in some if engine == "numba" else [some[list(PLANS).index(name)]]:
         monkeypatch.setattr(
             backwards, "cut_evenly", lambda *_, sizes=sizes: Blocks((0, 3), (0, 3), *SHAPE[2:], *sizes)
         )

@@ -56,13 +56,23 @@ FRAMES = {
 }
 
 
-@pytest.fixture(scope="module", params=list(FRAMES))
-def light_fields(request, tmp_path_factory):
-    """(in memory, on disk)"""
+def light_fields_in(frame, tmp_path_factory):
     samples = np.random.default_rng(0).random((*SHAPE, 3)).astype(np.float32)
     upright = vcc.LightField.from_views(samples, 2 * mm, 2e-3, 1.0, disparity_range=(-0.3, 0.2))
-    given = upright.transformed(vcc.Affine(FRAMES[request.param]))
+    given = upright.transformed(vcc.Affine(FRAMES[frame]))
     return given, save_store(given, tmp_path_factory.mktemp("store") / "a.zarr", chunks=4)
+
+
+@pytest.fixture(scope="module", params=list(FRAMES))
+def in_both_frames(request, tmp_path_factory):
+    """(in memory, on disk)"""
+    return light_fields_in(request.param, tmp_path_factory)
+
+
+@pytest.fixture(scope="module")
+def light_fields(tmp_path_factory):
+    """(in memory, on disk), upright"""
+    return light_fields_in("upright", tmp_path_factory)
 
 
 def cut_as(monkeypatch, each):
@@ -75,8 +85,8 @@ def cut_as(monkeypatch, each):
 
 
 @pytest.mark.parametrize("name", list(CAMERAS))
-def test_pieces_add_up(light_fields, monkeypatch, name):
-    in_memory, on_disk = light_fields
+def test_pieces_add_up(in_both_frames, monkeypatch, name):
+    in_memory, on_disk = in_both_frames
     camera, options = CAMERAS[name]
     plan = camera.compile(in_memory, **options)
     assert camera.compile(on_disk, **options) == plan
@@ -92,11 +102,11 @@ def test_pieces_add_up(light_fields, monkeypatch, name):
         assert picture.sampling_error == pytest.approx(whole.sampling_error, rel=1e-4)
 
 
-def test_the_cameras_here_do_what_their_names_say(light_fields):
-    plans = {name: camera.compile(light_fields[1], **options) for name, (camera, options) in CAMERAS.items()}
+def test_the_cameras_here_do_what_their_names_say(in_both_frames):
+    plans = {name: camera.compile(in_both_frames[1], **options) for name, (camera, options) in CAMERAS.items()}
     assert plans["fine mask near the sensor"].core.refine > 1
     assert any(isinstance(each, BlurViews) for each in plans["diffuser at the views"].before)
-    turned = abs(light_fields[0].frame.linear[2, 2]) < 1e-9
+    turned = abs(in_both_frames[0].frame.linear[2, 2]) < 1e-9
     assert any(isinstance(each, SwapPixelAxes) for each in plans["strong defocus"].before) == turned
     # Turned, disparities along u say nothing of distances, and no gap is filled.
     assert turned or max(plans["strong defocus"].smear) > 1
