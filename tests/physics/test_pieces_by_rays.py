@@ -54,8 +54,16 @@ def image(camera: vcc.Camera, lf: vcc.LightField, **options) -> np.ndarray:
     return camera.capture(lf, method="rays", samples=16, **options).values.astype(float)
 
 
-@pytest.mark.parametrize("options", [{}, {"interpolation": "linear"}, {"between_views": "none"}], ids=str)
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        ("no stop", {}),
+        ("no stop", {"interpolation": "linear"}),
+        ("coded diffuser", {"between_views": "none"}),
+        ("lenslets", {}),
+        ("lenslets", {"interpolation": "linear"}),
+    ],
+)
 def test_pieces_cut_along_all_axes_add_up(name, options):
     camera, lf = CAMERAS[name], light_field()
     whole = image(camera, lf, **options)
@@ -111,7 +119,7 @@ def test_pieces_that_others_run_are_the_same(tmp_path):
     np.testing.assert_allclose(image(camera, stored, memory_limit=2**22), image(camera, lf), rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("rows_each", [1, 2, 3, 7])
+@pytest.mark.parametrize("rows_each", [1, 3])
 def test_blocks_of_rows_of_a_piece_add_up(monkeypatch, rows_each):
     """Blocks of some rows of pixels, each with a border of its own: ahead and, as adjoint, back."""
     from vcc.run import drive
