@@ -186,13 +186,11 @@ def test_every_library(name, library):
 @pytest.mark.parametrize(
     ("dtype", "channels"),
     [
-        *(("uint8", channels) for channels in (None, 1, 2, 3, 4, 5)),
+        *(("uint8", channels) for channels in (None, 3, 5)),
         *(("float32", channels) for channels in (None, 1, 2, 3, 4, 5)),
-        ("uint16", None),
         ("uint16", 4),
         ("uint32", 3),
         ("float16", 2),
-        ("float64", None),
         ("float64", 5),
     ],
 )
