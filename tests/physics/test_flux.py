@@ -65,9 +65,13 @@ CAMERAS = {
 
 
 @pytest.mark.parametrize(
-    ("interpolation", "engine"), [("linear", "numba"), ("cubic", "numba"), ("cubic", "reference")]
+    ("name", "interpolation", "engine"),
+    [
+        *((name, interpolation, "numba") for name in CAMERAS for interpolation in ("linear", "cubic")),
+        ("near the lens", "cubic", "reference"),
+        ("two lenses and a prism between", "cubic", "reference"),
+    ],
 )
-@pytest.mark.parametrize("name", list(CAMERAS))
 def test_a_sensor_that_catches_everything_records_all_the_light(name, interpolation, engine):
     elements, z = CAMERAS[name]
     lf = random_field(disparity_range=(-0.2, 0.3))
@@ -79,9 +83,17 @@ def test_a_sensor_that_catches_everything_records_all_the_light(name, interpolat
     assert lf.flux == pytest.approx(by_hand, rel=1e-12)
 
 
-@pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
-@pytest.mark.parametrize("refine", [2, 3])
-@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
+@pytest.mark.parametrize(
+    ("interpolation", "refine", "engine"),
+    [
+        ("linear", 2, "numba"),
+        ("cubic", 2, "numba"),
+        ("linear", 3, "numba"),
+        ("cubic", 3, "numba"),
+        ("cubic", 2, "reference"),
+        ("linear", 3, "array_api"),
+    ],
+)
 def test_refined_samples_keep_the_light(interpolation, refine, engine):
     elements, z = CAMERAS["prism"]
     lf = random_field(3, disparity_range=(-0.2, 0.3))
@@ -129,9 +141,18 @@ def covered_sensor(d: float) -> vcc.Sensor:
     return vcc.Sensor(d, (9, 9), d * 2e-3 * 0.77)
 
 
-@pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
-@pytest.mark.parametrize("interpolation", ["linear", "cubic"])
-@pytest.mark.parametrize("d", [50 * mm, 51.3 * mm, 54 * mm])
+@pytest.mark.parametrize(
+    ("d", "interpolation", "engine"),
+    [
+        *(
+            (d, interpolation, "numba")
+            for d in (50 * mm, 51.3 * mm, 54 * mm)
+            for interpolation in ("linear", "cubic")
+        ),
+        (51.3 * mm, "linear", "reference"),
+        (54 * mm, "cubic", "array_api"),
+    ],
+)
 def test_uniform_radiance_through_a_square_aperture_gives_L0_A_over_d2(d, interpolation, engine):
     side = 13.37 * mm  # cuts through cells
     square = vcc.Mask(pattern=np.ones((1, 1)), width=side)
@@ -161,10 +182,19 @@ def assert_even(camera: vcc.Camera, radiant_exposure: float, interpolation: str,
     np.testing.assert_allclose(image.values, radiant_exposure, rtol=rel)
 
 
-@pytest.mark.parametrize("engine", ["numba", "reference", "array_api"])
-@pytest.mark.parametrize("interpolation", ["sharp", "linear"])
-@pytest.mark.parametrize("diameter", [16 * mm, 3.3 * mm, 0.6 * mm])
-@pytest.mark.parametrize("d", [50 * mm, 54 * mm])
+@pytest.mark.parametrize(
+    ("d", "diameter", "interpolation", "engine"),
+    [
+        *(
+            (d, diameter, interpolation, "numba")
+            for d in (50 * mm, 54 * mm)
+            for diameter in (16 * mm, 3.3 * mm, 0.6 * mm)
+            for interpolation in ("sharp", "linear")
+        ),
+        (54 * mm, 3.3 * mm, "sharp", "reference"),
+        (50 * mm, 16 * mm, "sharp", "array_api"),
+    ],
+)
 def test_uniform_radiance_through_a_round_lens_gives_L0_pi_D2_over_4_d2(d, diameter, interpolation, engine):
     camera = vcc.Camera([lens(50, diameter=diameter)], covered_sensor(d))
     assert_even(camera, RADIANCE * np.pi * diameter**2 / 4 / d**2, interpolation, engine)

@@ -84,8 +84,14 @@ def test_dot_products_on_random_cameras(kind, engine, largest):
         assert dot_error(op) <= largest, case.described()
 
 
-@pytest.mark.parametrize(("engine", "largest"), [("numba", SINGLE), ("reference", DOUBLE)])
-@pytest.mark.parametrize("name", list(CAMERAS))
+@pytest.mark.parametrize(
+    ("name", "engine", "largest"),
+    [
+        *((name, "numba", SINGLE) for name in CAMERAS),
+        ("diffuser at the views", "reference", DOUBLE),
+        ("lenslets", "reference", DOUBLE),
+    ],
+)
 def test_dot_products_on_turned_views_of_three_channels(name, engine, largest):
     few = (2, 3, 7, 8)
     given = light_field("float16", 3, shape=few).transformed(turned(0.4))
