@@ -40,7 +40,7 @@ BY_THREADS = ("in mid-path", "divided samples", "at the views")
 
 
 def light_field(kind=np.float32, channels=(3,)):
-    values = np.random.default_rng(1).random((5, 4, 22, 26, *channels))
+    values = np.random.default_rng(1).random((5, 4, 16, 20, *channels))
     whole = np.dtype(kind).kind == "u"
     values = np.round(values * np.iinfo(kind).max) if whole else values
     return vcc.LightField.from_views(
