@@ -179,7 +179,7 @@ CAPTURE = "capture", "camera.toml", "views"
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((*CAPTURE, "-o", "p.gif"), 'Error: "p.gif" cannot be written'),
+        ((*CAPTURE, "-o", "p.gif"), 'Error: the output cannot be written as "p.gif"'),
         ((*CAPTURE, "-o", "lost/p.png"), "there is no folder lost"),
         ((*CAPTURE, "-o", "folder.png"), "is a folder"),
         (("capture", "lost.toml", "views", "-o", "p.npy"), "there is no camera file"),

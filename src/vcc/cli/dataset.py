@@ -9,9 +9,8 @@ from cyclopts import Group, Parameter
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import progress, show
-from vcc.cli.executing import Executing, Who
+from vcc.cli.executing import Who, opened
 from vcc.cli.options import (
-    MAKING,
     CameraFile,
     Counts,
     Given,
@@ -128,25 +127,6 @@ class Truth(Given):
         return {"truth": asked, "psf_distances": self.psf or (), "psf_size": self.psf_size}
 
 
-@Parameter(name="*", group=MAKING)
-@dataclass(frozen=True, kw_only=True)
-class MakingShards(Executing):
-    """The executor that makes the shards.
-
-    Args:
-        executor: What makes the shards: `processes` or `threads`, one per core of this machine, or a Dask cluster
-            by its scheduler, "dask://host:8786", whose workers see the same disk. Each task uses one thread.
-            `none`: one pair after the other.
-    """
-
-    executor: Who = "processes"
-
-    @property
-    def named(self) -> Executing:
-        """The executor, None for "none"."""
-        return Executing() if self.executor == "none" else self
-
-
 def dataset(
     camera: CameraFile,
     /,
@@ -159,7 +139,7 @@ def dataset(
     drawing: Drawing = Drawing(),
     truth: Truth = Truth(),
     how: Making = Making(),
-    executing: MakingShards = MakingShards(),
+    executor: Who = "processes",
 ) -> None:
     """Make pairs of recordings and ground truth, for training.
 
@@ -169,9 +149,10 @@ def dataset(
         per_shard: Number of pairs in a shard, which one task makes.
         kind: Files of the pairs: `webdataset`, tar files; `zarr`, a Zarr group.
         licence: Of the data set, for its card.
+        executor: What makes the shards: `processes` or `threads`, one per core of this machine, or a Dask cluster
+            by its scheduler, "dask://host:8786", whose workers see the same disk. Each task uses one thread.
+            `none`: one pair after the other.
     """
-    who = executing.named
-    who.check_name()
     if not scenes:
         raise InputError("give at least one scene, a store: vcc dataset camera.toml scene.zarr -o pairs")
     optics = load_camera(camera)
@@ -183,14 +164,14 @@ def dataset(
         "kind": kind,
         "licence": licence or "",
     }
-    with who.opened() as executor, progress("Recording pairs") as advance:
+    with opened(executor) as running, progress("Recording pairs") as advance:
         made = make_dataset(
             output,
             optics,
             list(scenes),
             drawing.cameras_of(camera.parent),
             how,
-            executor=executor,
+            executor=running,
             progress=advance,
             **options,
         )

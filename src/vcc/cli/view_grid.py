@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.cli.console import saved_figure
 from vcc.files import transfer as curves
-from vcc.files.atomic import atomic_path
 from vcc.files.pictures import auto_exposure
 from vcc.plot.style import NOTHING, SMALL, TEXT, TITLE, new_axes
 
@@ -53,9 +53,7 @@ class Views:
 def draw(views: Views, title: str, path: Path, assumed: bool) -> str:
     """Write the drawing of the grid of views, and return a message."""
     figure = grid_figure(views.at, views.shape, views.frame, views.transfer, title, assumed)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary)
-    return f"{path}: written"
+    return saved_figure(figure, path)
 
 
 def grid_figure(

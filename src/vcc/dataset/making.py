@@ -25,6 +25,7 @@ from vcc.dataset.scenes import scenes_of
 from vcc.dataset.shards import Shards
 from vcc.dataset.zarr_group import ZarrGroup
 from vcc.fields.samples import InMemory
+from vcc.files.atomic import check_parent
 from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
 from vcc.plan.how import How
@@ -149,8 +150,7 @@ def make_dataset(
     if executor is not None:
         vars(_local).clear()  # the scene: workers open their own
     check_name(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be made: there is no folder {path.parent}; make it first")
+    check_parent(path)
     disk, remarks = KINDS[kind](path, card), Notices()
     lock = WriterLock(path)
     try:

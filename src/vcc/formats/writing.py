@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import os
-import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,9 +18,9 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
-from vcc.files.atomic import refusal
+from vcc.files.atomic import atomic_folder
 from vcc.files.image_metadata import ImageMetadata
-from vcc.files.parts import check_name, clear_leftovers, part_of
+from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.pictures import Exposure, save_picture, write_codes
 from vcc.formats import arrays, eslf, lftoolbox, video
 from vcc.formats.cameras import Cameras, cameras_of
@@ -324,22 +322,10 @@ def _new_folder(path: Path) -> Iterator[Path]:
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         what = "holds files already" if path.is_dir() else "is a file"
         raise InputError(f"{path} {what}: give the name of a new folder, or move it away")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.name} cannot be written: there is no folder {path.parent}. Make it first")
-    temporary = part_of(path)
-    try:
+    with atomic_folder(path) as temporary:
         clear_leftovers(path)
         temporary.mkdir()
         yield temporary
-        if path.exists():
-            path.rmdir()
-        os.replace(temporary, path)  # noqa: PTH105  (Path.replace of a folder is the same)
-    except OSError as error:
-        raise InputError(
-            f"{path} could not be written: {refusal(error, temporary)}. Nothing of it is kept"
-        ) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 # --- cameras ---

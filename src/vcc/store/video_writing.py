@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -25,7 +24,7 @@ from vcc.base.progress import Progress
 from vcc.base.reading import expanded
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples, check_is_light_field
-from vcc.files.atomic import atomic_path
+from vcc.files.atomic import atomic_folder, atomic_path
 from vcc.files.parts import check_name, clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import Transfer, plain, written_here
@@ -319,18 +318,13 @@ def create_video(
 
 def _begin(folder: Path, attributes: VideoAttributes) -> None:
     """Create the group under a temporary name and rename it."""
-    if not folder.parent.is_dir():
-        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
-    part = part_of(folder)
-    try:
+    with atomic_folder(folder) as part:
         part.mkdir()
         _write_attributes(part, attributes)
-        part.replace(folder)
+    try:
         settle_names(folder.parent)
     except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        raise InputError(f"{folder} could not be flushed to the disk: {error.strerror or error}") from error
 
 
 def _removed_if_empty(folder: Path) -> None:

@@ -28,7 +28,7 @@ from vcc.fields.filling import Filling
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.fields.view_arrays import one_view
-from vcc.files.atomic import refusal
+from vcc.files.atomic import atomic_folder, refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock, in_turn
 from vcc.store.attributes import (
@@ -477,12 +477,9 @@ def _make(
     """Create the group and its array under a temporary name and rename the folder."""
     import zarr
 
-    if not folder.parent.is_dir():
-        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     cut = layout(shape, kind, packing, chunks)
-    part = part_of(folder)
 
-    def make() -> None:
+    def make(part: Path) -> None:
         store = zarr.storage.LocalStore(part)
         group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
         group.create_array(
@@ -494,13 +491,8 @@ def _make(
             **cut,
         )
 
-    try:
-        uninterrupted(make)
-        part.replace(folder)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    with atomic_folder(folder) as part:
+        uninterrupted(make, part)
 
 
 def _writable(array: Any) -> Any:

@@ -6,7 +6,6 @@ An image is on disk completely or not at all. Its entry in ``done`` and its numb
 from __future__ import annotations
 
 import os
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,8 +21,8 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, reading, value_at
 from vcc.base.version import VERSION
-from vcc.files.atomic import refusal
-from vcc.files.parts import check_name, clear_leftovers, part_of
+from vcc.files.atomic import atomic_folder, check_parent, refusal
+from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import difference, plain, same
 from vcc.sweeps.metrics import KNOWN
@@ -76,8 +75,7 @@ class InStore(Results):
         super().__init__(swept)
         self.path = Path(path).expanduser()
         check_name(self.path)
-        if not self.path.parent.is_dir():
-            raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
+        check_parent(self.path)
         stated = None if description is None else plain({**description, "pictures": picture}, "description")
         there = os.path.lexists(self.path)
         if there:
@@ -312,8 +310,7 @@ def _make(
     """Create the group and its arrays under a temporary name, and rename it when complete."""
     import zarr
 
-    part = part_of(folder)
-    try:
+    with atomic_folder(folder) as part:
         group = zarr.create_group(
             zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description, metrics)}
         )
@@ -335,11 +332,6 @@ def _make(
         if picture is not None and values is not None:
             for place in np.ndindex(*swept.shape):
                 made[place] = values[place]
-        part.replace(folder)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {refusal(error, part)}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _statement(swept: Sweep, description: dict[str, Any] | None, metrics: dict[str, str | None]) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def depth(
     output: Store,
     where: ViewsOfPicture = ViewsOfPicture(),
     reading: ReadingDepth = ReadingDepth(),
-    by: RenderedBy = RenderedBy(),
+    executor: RenderedBy = None,
     dtype: SampleType = "float16",
 ) -> None:
     """Make the views around a picture from its depth; hidden parts behind edges are filled in.
@@ -88,7 +88,7 @@ def depth(
         middle = 2 / (1 / distances.min() + 1 / distances.max())
         cameras = where.cameras(pixels=pixels, focus_distance=float(middle))
         scene = DepthMapScene.for_cameras(radiance, distances, cameras)
-    make(scene, cameras, output, dtype, by)
+    make(scene, cameras, output, dtype, executor)
     corner = scene.uncovered(cameras.camera(0, 0))
     show(f"{float(corner.mean()):.1%} of the corner view was filled in: behind edges and beyond the border")
 

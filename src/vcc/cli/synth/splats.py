@@ -136,7 +136,7 @@ def splats(
     where: ViewsOfSplats = ViewsOfSplats(),
     standing: Standing = Standing(),
     drawing: Drawing = Drawing(),
-    by: RenderedBy = RenderedBy(),
+    executor: RenderedBy = None,
     dtype: SampleType = "float16",
 ) -> None:
     """Render Gaussian splats: true views with occlusion, and the disparities of the middle one.
@@ -165,7 +165,7 @@ def splats(
     focus = cameras.focus_distance
     converge = "parallel views" if focus == float("inf") else f"views converge at {short(focus, digits=3)}"
     show(f"{converge}, {short(cameras.spacings[1], digits=3)} apart")
-    make(scene, cameras, output, dtype, by)
+    make(scene, cameras, output, dtype, executor)
 
 
 def show_left_out(scene: SplatScene, way_out: str = "") -> None:
