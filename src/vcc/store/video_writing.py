@@ -27,12 +27,12 @@ from vcc.fields.samples import Samples, check_is_light_field
 from vcc.files.atomic import atomic_folder, atomic_path
 from vcc.files.parts import check_name, clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import Transfer, plain, written_here
+from vcc.store.attributes import Attributes, Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
 from vcc.store.held import drawn
 from vcc.store.reading import restored
-from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
+from vcc.store.video_layout import SHARED, UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
 from vcc.store.video_reading import is_video, open_video
 from vcc.store.writing import Framed, StoreWriter, create_store, in_one_piece, write_all
 
@@ -89,15 +89,9 @@ class VideoWriter:
         check_is_light_field(light_field)
         kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
         grid = kept.grid
-        common = Common(
-            grid.shape,
-            grid.kind,
-            grid.frame,
-            kept.transfer,
-            grid.sample,
-            kept.channel_names or self.packing.channel_names,
-            grid.wavelengths,
-        )
+        names = kept.channel_names or self.packing.channel_names
+        shared = Attributes(grid.frame, kept.transfer, names, sample=grid.sample, wavelengths=grid.wavelengths)
+        common = Common(grid.shape, grid.kind, shared)
         stated = {
             "disparity_range": grid.disparity_range,
             "provenance": kept.provenance,
@@ -142,7 +136,8 @@ class VideoWriter:
         frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
         sizes = tuple(int(size) for size in shape)
         how = self.packing
-        common = Common(sizes, np.dtype(dtype), frame, how.transfer, sample, how.channel_names)
+        shared = Attributes(frame, how.transfer, how.channel_names, sample=sample)
+        common = Common(sizes, np.dtype(dtype), shared)
         made = None if provenance is None else dict(provenance)
         with self._frame(common, time, {"disparity_range": disparity_range, "provenance": made}) as writer:
             yield writer
@@ -167,15 +162,12 @@ class VideoWriter:
         begin = partial(
             create_store,
             part,
-            common.frame,
+            common.attributes.frame,
             common.shape,
             common.kind,
-            transfer=common.transfer,
-            channel_names=common.channel_names,
-            sample=common.sample,
-            wavelengths=common.wavelengths,
             chunks=self.packing.chunks,
             compression=self.packing.compression,
+            **{name: getattr(common.attributes, name) for name in SHARED[1:]},
             **stated,
         )
         put = partial(self._put, part, common, place)
