@@ -470,7 +470,7 @@ PINHOLE = vcc.Camera(
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"format_version": 2}, "has format_version 2, and this vcc reads videos up to 1"),
+        ({"format_version": 2}, "has format_version 2, and this vcc reads up to 1"),
         ({"format_version": "one"}, "format_version is a whole number, 1 or more, not 'one'"),
         ({"between": "mixed"}, "between is 'linear' or 'held', not 'mixed'"),
         ({"grid": 3}, "grid is an object or null, not int"),

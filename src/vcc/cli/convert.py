@@ -25,15 +25,14 @@ from vcc.cli.options import (
     Length,
     Lengths,
     LightFieldFile,
+    Number,
     OutputFile,
     Overwrite,
     Reading,
     ViewExposure,
     Whole,
-    above_zero,
     exposed,
     given_options,
-    quantity,
 )
 from vcc.cli.store_words import video_written, written
 from vcc.formats import open_unstructured, read_geometry
@@ -102,7 +101,7 @@ class Posing:
     distances: Lengths | None = None
     pixels: Counts | None = None
     images: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
-    off_plane: Annotated[float | None, quantity("NUMBER", above_zero)] = None
+    off_plane: Number | None = None
 
     def on_grid(self, path: Path, reading: Reading) -> LightField:
         """The photographs at a path as a light field; their share of missing pixels is a warning.
@@ -142,7 +141,7 @@ def convert(
     kind: FileKind | None = None,
     exposure: ViewExposure = 1.0,
     overwrite: Overwrite = False,
-    frame_rate: Annotated[float | None, quantity("NUMBER", above_zero)] = None,
+    frame_rate: Number | None = None,
     storing: Storing = Storing(),
     reading: Reading = Reading(),
     posing: Posing = Posing(),

@@ -13,8 +13,8 @@ from vcc.cli.executing import Who, opened
 from vcc.cli.options import (
     CameraFile,
     Counts,
-    Given,
     Making,
+    Number,
     Output,
     Whole,
     above_zero,
@@ -56,7 +56,7 @@ Factors = Annotated[tuple[float, float], quantity("LOW HIGH", above_zero, tokens
 
 @Parameter(name="*", group=DRAWING)
 @dataclass(frozen=True, kw_only=True)
-class Drawing(Given):
+class Drawing:
     """What is drawn for each pair, from the seed and its number alone.
 
     Args:
@@ -82,7 +82,7 @@ class Drawing(Given):
     gain: Factors | None = None
     color_gain: Factors | None = None
     exposure: Annotated[Times, quantity("auto|TIME|TIME:TIME", _times)] = "auto"
-    radiance: Annotated[float, quantity("NUMBER", above_zero)] = 1.0
+    radiance: Number = 1.0
     seed: Whole = 0
 
     @property
@@ -103,7 +103,7 @@ class Drawing(Given):
 
 @Parameter(name="*", group=TRUTH)
 @dataclass(frozen=True, kw_only=True)
-class Truth(Given):
+class Truth:
     """Ground truth, on the same pixels as the recordings.
 
     Args:

@@ -1,18 +1,16 @@
 """``vcc demo``: the paper's examples."""
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from vcc.cli.console import make_folder
+from vcc.cli.options import OutputFolder, ShownLightField
 from vcc.demo import run_demo
 
 
 def demo(
     *,
-    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")] = Path("vcc-demo"),
-    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
+    output: OutputFolder = Path("vcc-demo"),
+    light_field: ShownLightField | None = None,
     small: bool = False,
 ) -> None:
     """Run the paper's examples and its own check, and explain them on a page of pictures.

@@ -1,15 +1,10 @@
 """``vcc expose``: the recording of a real sensor."""
 
-from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import by_photodiode, check_output, show
 from vcc.cli.executing import OfBlocks, check_blocks, opened
-from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
+from vcc.cli.options import CameraFile, File, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
 from vcc.recording import PhotodiodeRecording
 
@@ -23,7 +18,7 @@ def expose(
     exposure: Time = "auto",
     seed: Whole = 0,
     radiance: float = 1.0,
-    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    picture: File | None = None,
     how: Making = Making(),
     executor: OfBlocks = None,
     reading: Reading = Reading(),

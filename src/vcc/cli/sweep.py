@@ -12,14 +12,14 @@ from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
 from vcc.cli.executing import Who, opened
 from vcc.cli.options import (
     CameraFile,
-    Given,
+    File,
     Length,
     LightFieldFile,
     Making,
+    Number,
     Output,
     Reading,
     Whole,
-    above_zero,
     quantity,
 )
 from vcc.fields.samples import Samples
@@ -55,7 +55,7 @@ def setting(text: str, option: str) -> tuple[str, str]:
 
 @Parameter(name="*", group=TOLD)
 @dataclass(frozen=True, kw_only=True)
-class Told(Given):
+class Told:
     """Columns of the table, in addition to each image's mean, missing rays and sampling error.
 
     Args:
@@ -67,9 +67,9 @@ class Told(Given):
     """
 
     sharpness: bool = False
-    target: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    target: File | None = None
     deblurring: Length | None = None
-    noise: Annotated[float, quantity("NUMBER", above_zero)] = 0.01
+    noise: Number = 0.01
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -107,8 +107,8 @@ def sweep(
     design: Kind = "grid",
     count: Whole | None = None,
     seed: Whole = 0,
-    table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
-    sheet: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    table: File | None = None,
+    sheet: File | None = None,
     told: Told = Told(),
     how: Making = Making(),
     executor: Who = None,

@@ -18,7 +18,7 @@ from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json, shown, value_at
 from vcc.fields.grid import Grid, check_shape
-from vcc.store.attributes import DTYPES, Attributes, plain
+from vcc.store.attributes import DTYPES, Attributes, check_version, plain
 from vcc.store.held import IDENTITY
 
 VIDEO_VERSION = 1
@@ -138,12 +138,7 @@ class VideoAttributes(Brief):
         stated = video_attributes(path)
         if stated is None:
             raise InputError(f"{path} is not a video of light fields: vcc.store.open_store opens a light field")
-        version = checks.whole_number_between(f"{path}: format_version", stated.get("format_version"), 1)
-        if version > VIDEO_VERSION:
-            raise InputError(
-                f"{path} has format_version {version}, and this vcc reads videos up to {VIDEO_VERSION}: use a "
-                "newer vcc"
-            )
+        check_version(path, stated.get("format_version"), VIDEO_VERSION)
         between = stated.get("between", "linear")
         checks.one_of(f"{path}: between", between, get_args(Between))
         common, provenance = stated.get("grid"), stated.get("provenance") or {}

@@ -24,7 +24,7 @@ from vcc.base.version import VERSION
 from vcc.files.atomic import atomic_folder, check_parent, refusal
 from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import difference, plain, same
+from vcc.store.attributes import check_version, difference, plain, same
 from vcc.sweeps.metrics import KNOWN
 from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
 from vcc.sweeps.stored import StoredPictures, member, small
@@ -262,13 +262,9 @@ def _stated(folder: Path) -> dict[str, Any]:
         raise InputError(f"{folder} is no sweep: it {'is a file' if folder.is_file() else 'holds no zarr.json'}")
     stated = read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}")
     found = value_at(stated, "attributes", KEY)
-    if not isinstance(found, dict) or not isinstance(found.get("format_version"), int):
+    if not isinstance(found, dict):
         raise InputError(f'{folder} is a Zarr group, and no sweep: its attributes have no "{KEY}"')
-    if found["format_version"] > FORMAT_VERSION:
-        raise InputError(
-            f"{folder} has format_version {found['format_version']}, and this vcc reads up to {FORMAT_VERSION}: "
-            "use a newer vcc"
-        )
+    check_version(folder, found.get("format_version"), FORMAT_VERSION)
     if not isinstance(found.get("metrics"), dict):
         raise InputError(f"{folder} cannot be used as a sweep: it does not state its metrics")
     return found

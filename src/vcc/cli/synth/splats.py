@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
-from vcc.cli.options import Counts, Length, Lengths, Whole, above_zero, quantity
+from vcc.cli.options import Counts, File, Length, Lengths, Number, Whole
 from vcc.cli.synth.opengl import Colour, Position
 from vcc.cli.synth.rendering import (
     HOW,
@@ -26,8 +26,6 @@ from vcc.formats.poses import PosedCamera, read_poses
 from vcc.sources import CameraArray, Viewpoint
 from vcc.sources.splats import Splats, SplatScene, read_splats
 from vcc.sources.splats.looking import arranged, cameras_around, contact_sheet, seen, viewpoint_of
-
-Number = Annotated[float, quantity("NUMBER", above_zero)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +73,7 @@ class Standing:
         up: The upward direction in the views, with --eye. Default: −y for .ply and .splat, y for others.
     """
 
-    camera_from: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    camera_from: File | None = None
     camera: Whole = 0
     eye: Position | None = None
     target: Position | None = None

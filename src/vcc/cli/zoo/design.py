@@ -1,19 +1,16 @@
 """``vcc zoo design``: learn a code and a decoder together, and decoders for its controls."""
 
-from pathlib import Path
-from typing import Annotated, Literal
-
-from cyclopts import Parameter
+from typing import Literal
 
 from vcc.base import lazy_import
 from vcc.cli.console import progress, show
-from vcc.cli.options import Whole
+from vcc.cli.options import OutputFolder, Whole
 
 
 def design(
     *,
     task: str,
-    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")],
+    output: OutputFolder,
     light: float = 0.25,
     cells: Whole = 14,
     feature: Whole = 2,

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from vcc.cli.console import check_output, show
+from vcc.cli.options import Output
 from vcc.sweeps.table import ENDINGS
 from vcc.zoo import Report
 
@@ -15,7 +16,7 @@ def table(
     /,
     *,
     task: str = "edof",
-    output: Annotated[Path | None, Parameter(alias="-o", metavar="FILE")] = None,
+    output: Output | None = None,
 ) -> None:
     """Print the table of a run as Markdown, with standard errors and the gains over controls.
 
