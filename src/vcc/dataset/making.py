@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.notices import Notices
+from vcc.base.notices import Notices, worked_elsewhere
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import expanded
 from vcc.camera import Camera
@@ -293,10 +293,5 @@ def _opened(scene: Any) -> Opened:
 
 def _written_elsewhere(shared: tuple[Shard, int], shard: int) -> Notices:
     """A shard as a task; returns its warnings, unless it runs in a thread of the process that asks."""
-    (work, asking), remarks = shared, Notices()
-    if os.getpid() == asking:
-        work.write(shard)
-        return remarks
-    with remarks.gathered():
-        work.write(shard)
-    return remarks
+    work, asking = shared
+    return worked_elsewhere(lambda: work.write(shard), asking)[1]

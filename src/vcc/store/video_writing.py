@@ -221,11 +221,7 @@ class VideoWriter:
             )
 
     def _check_may_write(self, ending: bool = False) -> None:
-        if not self._lock.held:
-            raise InputError(
-                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
-                "that, or make one by create_video"
-            )
+        self._lock.check("create_video")
         if self._busy and not ending:
             raise InputError(
                 f"a frame of {self.path} is being written: one follows the other, end its block first"

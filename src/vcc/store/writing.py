@@ -114,11 +114,7 @@ class StoreWriter:
             raise InputError(f"there is no view ({row}, {column}) in a store of {nv}×{nu} views")
         if self.attributes.complete:
             raise InputError(f"{self.path} is finished: its views stay as they are")
-        if not self._lock.held:
-            raise InputError(
-                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
-                "that, or make one by create_store"
-            )
+        self._lock.check("create_store")
         view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
         try:
             uninterrupted(self.array.__setitem__, (row, column), view)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +25,10 @@ from vcc.files.atomic import atomic_folder, check_parent, refusal
 from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
 from vcc.store.attributes import check_version, difference, plain, same
+from vcc.store.zarr_chunks import opened_array
 from vcc.sweeps.metrics import KNOWN
 from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
-from vcc.sweeps.stored import StoredPictures, member, small
+from vcc.sweeps.stored import SWEEP, StoredPictures, small
 from vcc.sweeps.values import Varied
 
 KEY = "sweep"
@@ -87,7 +88,7 @@ class InStore(Results):
                 _make(self.path, swept, picture, stated, metrics)
             for left in self.path.rglob("*.partial"):  # left by a killed run
                 left.unlink(missing_ok=True)
-            self._group = _opened(self.path, "r+")
+            self._group = _opened(self.path)
             self._pictures: Any = None if picture is None else self._group[PICTURES]
             self._take_over(metrics)
         except BaseException:
@@ -141,7 +142,7 @@ class InStore(Results):
     def _take_over(self, metrics: dict[str, str | None]) -> None:
         """Load the results of the same sweep, and create arrays for metrics that are new or have changed."""
         there = _stated(self.path)["metrics"]
-        self.swept.done[...] = small(self.path, self._group, DONE, self.swept.shape)
+        self.swept.done[...] = small(self.path, DONE, self.swept.shape)
         wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
         if wanted and self._pictures is None and self.swept.done.any():
             raise InputError(
@@ -157,7 +158,7 @@ class InStore(Results):
             # Written last: after a kill before this point, the metrics still count as missing.
             self._group.attrs[KEY] = {**self._group.attrs[KEY], "metrics": {**there, **metrics}}
         shape = self.swept.shape
-        numbers = {name: small(self.path, self._group, name, shape) for name in (*KNOWN, *there, *wanted)}
+        numbers = {name: small(self.path, name, shape) for name in (*KNOWN, *there, *wanted)}
         self.swept = replace(self.swept, numbers=numbers)
 
     def _note(self) -> None:
@@ -189,7 +190,6 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
     folder = expanded(path)
     with reading(folder, "a sweep"):
         stated = _stated(folder)
-        group = _opened(folder, "r")
         axes, parameters = tuple(stated["axes"]), stated["parameters"]
         together = axes != tuple(each["name"] for each in parameters)
         sizes = [len(each["labels"]) for each in parameters]
@@ -199,28 +199,28 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
         coordinates = tuple(
             Varied(
                 each["name"],
-                tuple(small(folder, group, each["name"], (size,)).tolist()),
+                tuple(small(folder, each["name"], (size,)).tolist()),
                 tuple(each["labels"]),
                 each["unit"],
             )
             for each, size in zip(parameters, sizes, strict=True)
         )
-        frames = small(folder, group, FRAME, (3, 3), (*shape, 3, 3))
+        frames = small(folder, FRAME, (3, 3), (*shape, 3, 3))
         if not np.isfinite(frames).all():
             raise InputError(f"{folder / FRAME} holds numbers that are not finite")
         return Sweep(
             axes,
             coordinates,
-            {name: small(folder, group, name, shape) for name in (*KNOWN, *stated["metrics"])},
-            _pictures_of(folder, group, shape) if (folder / PICTURES).is_dir() else None,
+            {name: small(folder, name, shape) for name in (*KNOWN, *stated["metrics"])},
+            _pictures_of(folder, shape) if (folder / PICTURES).is_dir() else None,
             frames,
-            small(folder, group, DONE, shape),
+            small(folder, DONE, shape),
         )
 
 
-def _pictures_of(folder: Path, group: Any, shape: tuple[int, ...]) -> StoredPictures:
+def _pictures_of(folder: Path, shape: tuple[int, ...]) -> StoredPictures:
     """The images of a sweep, one per chunk; the shape is checked."""
-    array, n = member(folder, group, PICTURES), len(shape)
+    array, n = opened_array(folder, PICTURES, SWEEP), len(shape)
     one = (*(1,) * n, *array.shape[n:])
     if tuple(array.shape[:n]) != shape or tuple(array.chunks) != one or len(one) - n not in (2, 3):
         raise InputError(
@@ -270,12 +270,12 @@ def _stated(folder: Path) -> dict[str, Any]:
     return found
 
 
-def _opened(folder: Path, mode: Literal["r", "r+"]) -> Any:
+def _opened(folder: Path) -> Any:
+    """The group, for writing."""
     import zarr
 
     try:
-        store = zarr.storage.LocalStore(folder, read_only=mode == "r")
-        return zarr.open_group(store=store, mode=mode, zarr_format=3)
+        return zarr.open_group(store=zarr.storage.LocalStore(folder), mode="r+", zarr_format=3)
     except Exception as error:
         raise InputError(f"{folder} cannot be used as a sweep: {in_words(error)}") from error
 
