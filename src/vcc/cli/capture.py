@@ -28,6 +28,15 @@ def capture(
 ) -> None:
     """Capture the image that a camera records of a light field.
 
+    For a sensor with photodiodes, the image of each is written next to the output, as NAME_ROW_COLUMN.
+
+    Examples:
+        vcc capture camera.toml views/ -o picture.png --spacing "1 mm"
+        vcc capture camera.toml views/ -o picture.exr --interpolation cubic
+        vcc capture camera.toml scene.zarr -o picture.exr --executor processes
+        vcc capture camera.toml video.zarr -o picture.png --start "0.2 s" --exposure-time "20 ms"
+        vcc capture moving.toml views/ -o picture.png --exposure-time "90 ms"
+
     Args:
         output: The image: .png, .tif and .jpg are for viewing (sRGB); .exr and .npy contain linear values.
         exposure: Factor from irradiance to the brightness of a .png or .tif. auto shows the brightest parts

@@ -148,7 +148,18 @@ def convert(
 ) -> None:
     """Convert a light field to a store (Zarr), or to files of another format.
 
+    A store keeps samples bit for bit, with their cameras. It opens at once and is read in parts, so that a
+    capture fits in any memory (--memory-limit). It appears when it is complete.
+
     Photographs with poses (COLMAP, transforms.json) are resampled onto a grid of views.
+
+    Examples:
+        vcc convert views/ scene.zarr --spacing "1 mm"
+        vcc convert views/ small.zarr --lossy jpegxl --quality 90
+        vcc convert scene.zarr half.zarr --dtype float16
+        vcc convert scene.zarr flight.mp4
+        vcc convert my_photographs/ field.zarr --unit "10 cm" --distances "1.4 m, 3 m"
+        vcc convert take/ video.zarr --frame-rate 24 --spacing "1 mm"
 
     Args:
         frame_rate: Frames per second: make a video from LIGHT_FIELD, a folder with one light field per frame

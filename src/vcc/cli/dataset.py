@@ -143,6 +143,14 @@ def dataset(
 ) -> None:
     """Make pairs of recordings and ground truth, for training.
 
+    Each pair has a camera of the design, a window of its sensor, an exposure and noise of its own. The card,
+    README.md, says how the set was made.
+
+    Examples:
+        vcc dataset camera.toml scene.zarr -o pairs --set "code.pattern=mura,circle" --count 400 --crop 256 256
+        vcc dataset camera.toml one.zarr two.zarr -o pairs --set "sensor.z=50mm:54mm" --design sobol --cameras
+            512 --sharp --depth --flips --exposure "1ms:20ms"
+
     Args:
         output: A new folder for the pairs and the card; the same command resumes an interrupted run.
         count: Number of pairs.

@@ -15,7 +15,11 @@ def explain(
     executor: OfBlocks = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Report how an image is made, what it costs, and which limits apply."""
+    """Report how an image is made, what it costs, and which limits apply.
+
+    Examples:
+        vcc explain camera.toml views/
+    """
     moving = load_moving_camera(camera)
     check_blocks(executor, light_field)
     field = reading.light_field(light_field)

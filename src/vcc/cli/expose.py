@@ -25,6 +25,13 @@ def expose(
 ) -> None:
     """Record a light field as a real sensor would: photons, electrons, noise, raw numbers.
 
+    The camera file describes the sensor in a table sensor.electronics. For a sensor with photodiodes, the
+    recording of each is written next to the output, as NAME_ROW_COLUMN.
+
+    Examples:
+        vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1
+        vcc expose camera.toml views/ -o raw.npy --picture picture.png
+
     Args:
         output: The raw numbers, .tif, .png or .npy: linear, not scaled, upside down as recorded.
         exposure: Exposure time, "10 ms". auto brings the brightest 0.1 % of the pixels to 90 % of saturation.

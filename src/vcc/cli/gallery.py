@@ -16,6 +16,11 @@ def gallery(
 ) -> None:
     """Rebuild a published camera, from optics to decoded result, and compare it with its claims.
 
+    Examples:
+        vcc gallery
+        vcc gallery wavefront-coding
+        vcc gallery biprism-stereo --light-field views/ -o stereo
+
     Args:
         name: Name of a camera. Without it, all are listed.
         light_field: Your own light field: a folder of views, a file or a store. Default: the built-in scene.

@@ -43,6 +43,13 @@ def info(
 ) -> None:
     """Report views, geometry, disparities and brightness of a light field, and what is unknown.
 
+    Examples:
+        vcc info views/
+        vcc info views/ --quick
+        vcc info views/ --picture grid.png
+        vcc info mosaic.png --views 9 9
+        vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"
+
     Args:
         quick: Read one view only: nothing is measured, and views are not compared.
         picture: Draw all views at the positions of their cameras, .png, .svg or .pdf.

@@ -26,6 +26,10 @@ def plot(
 ) -> None:
     """Draw a camera from the side with rays, or the path of a light field through it in phase space.
 
+    Examples:
+        vcc plot camera.toml -o camera.svg
+        vcc plot camera.toml --phase-space --light-field views/
+
     Args:
         output: The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, in the current
             folder.

@@ -116,6 +116,13 @@ def sweep(
 ) -> None:
     """Capture the images of many cameras: a camera file with varied parameters.
 
+    Images and a table are saved in a Zarr group for xarray; the same command resumes an interrupted sweep.
+
+    Examples:
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" --set "code.pattern=mura,circle" -o all.zarr
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv
+
     Args:
         set: A parameter, named by its element and its own name, and its values: a range
             "sensor.z=50mm:54mm:40" or a list "code.pattern=mura,circle,code.png"; patterns as in a camera

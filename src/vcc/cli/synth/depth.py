@@ -65,6 +65,11 @@ def depth(
 ) -> None:
     """Make the views around a picture from its depth; hidden parts behind edges are filled in.
 
+    Examples:
+        vcc synth depth room.png room-depth.exr -o room.zarr --field-of-view "60 deg"
+        vcc synth depth kinect.png kinect-depth.png -o out.zarr --depth-unit "1 mm"
+        vcc synth depth view.png disparity.pfm -o out.zarr --meaning disparity --focus-distance "4 m"
+
     Args:
         picture: The middle view.
         depth: Of the same pixels: .exr, .pfm, .npy, .tif or 16-bit .png; one channel.

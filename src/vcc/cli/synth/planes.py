@@ -29,6 +29,10 @@ def planes(
 ) -> None:
     """Render pictures on planes, the nearer ones before the others.
 
+    Examples:
+        vcc synth planes -o leaves.zarr
+        vcc synth planes -o two.zarr --plane "leaf.png, 0.8 m, 30 cm" --plane "town.jpg, 3 m, 2 m"
+
     Args:
         plane: A picture on a plane that faces the camera, centred on the axis; transparent where a PNG is.
             May be given more than once. Default: the demo's scene, leaves before a test chart before a town.

@@ -139,6 +139,14 @@ def splats(
 ) -> None:
     """Render Gaussian splats: true views with occlusion, and the disparities of the middle one.
 
+    --look lists cameras of the scene and draws a contact sheet of what they see.
+
+    Examples:
+        vcc synth splats room.ply --look
+        vcc synth splats room.ply -o room.zarr --camera 3 --parallax 1
+        vcc synth splats garden.ply -o garden.zarr --camera-from cameras.json --camera 12 --views 9 9
+        vcc synth splats garden.ply views.toml -o garden.zarr --executor processes
+
     Args:
         splats: A file .ply, .splat, .spz or .glb.
         output: The store to write or to resume. With --look: the contact sheet, .png, .svg or .pdf.

@@ -19,6 +19,9 @@ def page(
 ) -> None:
     """Write a page of a run: tables, quality over light, and a strip of pictures.
 
+    Examples:
+        vcc zoo page zoo.zarr -o page
+
     Args:
         task: Of the run.
         output: Folder of the page.

@@ -25,7 +25,16 @@ def run(
     without: Annotated[tuple[str, ...], Parameter(metavar="NAME"), Many] = (),
     executor: Who = None,
 ) -> None:
-    """Score cameras, scenes and decoders, except those whose results are in the store already.
+    """Score cameras, scenes and decoders for a task, with controls of the same light.
+
+    Results are kept by content: the same command resumes an interrupted run, and a new camera or decoder adds
+    only its own results.
+
+    Examples:
+        vcc zoo run --task edof -o zoo.zarr
+        vcc zoo run --task edof -o zoo.zarr --camera my.toml --decoder my.py:decode
+        vcc zoo run --task light-field -o zoo.zarr --seeds 3
+        vcc zoo run --task depth -o zoo.zarr --scene leaves-7 --scene views.zarr --executor processes
 
     Args:
         task: edof: a picture all in focus. depth: the distance of each pixel. light-field: 5×5 views. refocusing:

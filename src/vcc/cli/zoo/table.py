@@ -18,7 +18,11 @@ def table(
     task: str = "edof",
     output: Output | None = None,
 ) -> None:
-    """Print the table of a run as Markdown, with standard errors and the gains over controls.
+    """Print the table of a run, with standard errors over scenes and the gains over controls.
+
+    Examples:
+        vcc zoo table zoo.zarr
+        vcc zoo table zoo.zarr --task depth -o scores.csv
 
     Args:
         task: Of the run.
