@@ -128,7 +128,8 @@ def intrinsics_of(frame: Affine) -> NDArray[np.float64]:
 def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
     """Write a light field in the toolbox's format, with its frame as RectOptions.RectCamIntrinsicsH.
 
-    Samples keep their type and are linear. MATLAB reads the file with ``load``.
+    Samples keep their type and are linear. MATLAB reads the file with ``load``. The compressed file is made in
+    memory, next to the samples, and then written.
 
     Args:
         light_field: the light field.

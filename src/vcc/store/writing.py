@@ -87,10 +87,6 @@ class StoreWriter:
         kind: np.dtype[Any] = np.dtype(self.array.dtype)
         return kind
 
-    def has_view(self, row: int, column: int) -> bool:
-        """Whether a view exists."""
-        return self._reader.view_file(row, column).is_file()
-
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are still missing, row by row."""
         return self._reader.missing()
