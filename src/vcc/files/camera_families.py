@@ -183,7 +183,7 @@ class _LensFile(_InLensFile):
     @classmethod
     def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
         """The form that reads as an equal lens; None if the lens has no file, or its file is gone or differs."""
-        placed = {"z": lens.z, "decentre": lens.decentre, "name": lens.name}
+        placed: dict[str, Any] = {"z": lens.z, "decentre": lens.decentre, "name": lens.name}
         for stop, z_of in itertools.product((None, lens.stop_diameter), get_args(Reference)):
             rims = lens.exit_diameter is not None
             form = cls(lens.source, **placed, stop_diameter=stop, rims=rims, z_of=z_of)
