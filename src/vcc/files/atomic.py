@@ -137,7 +137,10 @@ def check_parent(target: Path) -> None:
     Raises:
         InputError: it does not, or it is a file.
     """
-    if not target.parent.is_dir():
+    folder = target.parent
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{target} cannot be written: {folder} is a file, not a folder")
+    if not folder.is_dir():
         raise InputError(
-            f"{target} cannot be written: there is no folder {target.parent}; make it first, or choose another"
+            f"{target} cannot be written: there is no folder {folder}; make it first, or choose another"
         )
