@@ -9,7 +9,7 @@ import pytest
 import vcc
 from tests.command_line import CAMERA, run
 from vcc.cli import executing
-from vcc.cli.executing import Executing
+from vcc.cli.executing import opened
 from vcc.store import save_store
 from vcc.units import mm
 
@@ -63,7 +63,7 @@ def test_what_ends_the_command_ends_its_processes():
     processes = []
 
     def interrupted():
-        with Executing(executor="processes").opened() as pool:
+        with opened("processes") as pool:
             pool.submit(int).result()
             pool.submit(time.sleep, 600)
             processes.extend(multiprocessing.active_children())

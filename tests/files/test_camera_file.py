@@ -834,5 +834,5 @@ def test_elements_of_ones_own(tmp_path, monkeypatch):
 
 
 def test_a_folder_that_does_not_exist(tmp_path):
-    with pytest.raises(InputError, match="does not exist"):
+    with pytest.raises(InputError, match="there is no folder"):
         save_camera(EVERYTHING, tmp_path / "lost" / "camera.toml")

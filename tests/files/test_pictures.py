@@ -238,8 +238,8 @@ def test_an_array_of_another_library(tmp_path: Path) -> None:
         ("a.png", {"exposure": 0}, "above 0, not 0"),
         ("a.png", {"exposure": "bright"}, "bright"),
         ("a.png", {"bits": 12}, "not 12"),
-        ("nowhere/a.png", {}, "nowhere does not exist.*mkdir"),
-        ("nowhere/a.exr", {}, "nowhere does not exist"),
+        ("nowhere/a.png", {}, "there is no folder .*nowhere; make it first"),
+        ("nowhere/a.exr", {}, "there is no folder .*nowhere"),
     ],
 )
 def test_what_cannot_be_written(name: str, options: dict, message: str, tmp_path: Path) -> None:

@@ -215,7 +215,7 @@ def test_what_is_too_bright_is_counted(tmp_path, light_field):
         ("a.mp4", {"exposure": "bright"}, "exposure is"),
         ("a.mp4", {"exposure": -1}, "exposure is"),
         ("a.avi", {}, r"end its name in \.mp4"),
-        ("lost/a.mp4", {}, "does not exist"),
+        ("lost/a.mp4", {}, "there is no folder"),
     ],
 )
 def test_flights_that_cannot_be(tmp_path, light_field, name, options, message):

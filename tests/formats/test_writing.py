@@ -75,7 +75,7 @@ def test_folders_say_what_samples_are(tmp_path, sample):
     assert ("sample" in (path / "parameters.cfg").read_text()) == (sample == "point")
     assert reopened(path).sample == read_geometry(path).sample == sample
     (path / "parameters.cfg").write_text((path / "parameters.cfg").read_text() + "sample = cell\n")
-    with pytest.raises(InputError, match='sample is "cell"; "mean" and "point" are known'):
+    with pytest.raises(InputError, match='sample is \'cell\'; "mean" and "point" are known'):
         reopened(path)
 
 

@@ -13,7 +13,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files, InclusionLevel
 from mkdocs.structure.pages import Page
 
-from vcc.cli.app import COMMANDS, RENDERERS, ZOO, app
+from vcc.cli.app import COMMANDS, RENDERERS, ZOO, app, documented
 
 ROOT = Path(__file__).parents[2]
 ELSEWHERE = "repository"
@@ -110,7 +110,8 @@ def _command_line() -> str:
     text = text[text.index("\n") : contents] + text[commands:]  # and the page its title
     text = re.sub(r"^(#+ vcc --([\w-]+))$", r"\1 {#vcc-\2}", text, flags=re.M)  # what it links to
     for group, listed in (("vcc", COMMANDS), ("vcc synth", RENDERERS), ("vcc zoo", ZOO)):
-        for name, (_, *examples) in listed.items():
+        for name in listed:
+            _, examples = documented(f"vcc.cli{group[3:].replace(' ', '.')}", name)
             usage = re.compile(rf"```console\n{group} {name}[ \n].*?```\n", re.DOTALL)
             shown = "\nFor example:\n\n```\n" + "\n".join(map(_broken, examples)) + "\n```\n"
             text = usage.sub(lambda found, shown=shown: found[0] + shown, text, count=1)

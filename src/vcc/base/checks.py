@@ -6,9 +6,10 @@ Numbers of any library are accepted as numbers; booleans and text are not.
 
 from __future__ import annotations
 
+import inspect
 import math
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,25 @@ def ending(what: str, path: Path, *endings: str) -> str:
     if found not in endings:
         raise InputError(f'{what} cannot be written as "{path.name}": end its name in {", ".join(endings)}')
     return found
+
+
+def options_of(function: Callable[..., Any], given: Iterable[str], but: tuple[str, ...], what: str) -> None:
+    """Check that a function has the parameters that a user passes on to it.
+
+    Args:
+        function: the function.
+        given: names of the options.
+        but: parameters that are no options.
+        what: noun for the function.
+
+    Raises:
+        InputError: another name.
+    """
+    taken = [name for name in inspect.signature(function).parameters if name not in but]
+    for name in given:
+        if name not in taken:
+            takes = ", ".join(sorted(taken)) or "no options"
+            raise InputError(f"{name}= is not supported by {what}, which takes {takes}")
 
 
 # --- integers ---

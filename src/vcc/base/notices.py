@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
 from vcc.base.errors import ResultWarning, warn_of_result
+
+Result = TypeVar("Result")
 
 MANY_KINDS = 5
 """Largest number of kinds of warnings that are passed on."""
 _collecting: list[tuple[int, Notices]] = []
 """Who collects now: threads, and their notices."""
+
+
+def worked_elsewhere(work: Callable[[], Result], asking: int) -> tuple[Result, Notices]:
+    """The result of a task and its warnings; without these in the process that asks, which collects its own.
+
+    Args:
+        work: called here.
+        asking: number of the process that sent the task.
+    """
+    remarks = Notices()
+    if os.getpid() == asking:
+        return work(), remarks
+    with remarks.gathered():
+        return work(), remarks
 
 
 class Notices:

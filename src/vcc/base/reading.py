@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import math
 import os
 import stat
 from collections.abc import Iterator
@@ -206,6 +207,14 @@ def read_json(data: bytes, name: str) -> dict[str, Any]:
     if not isinstance(found, dict):
         raise InputError(f"{name} is not a JSON object")
     return found
+
+
+def number(text: str | None) -> float:
+    """A number in text; NaN if it is none."""
+    try:
+        return float(text or "")
+    except ValueError:
+        return math.nan
 
 
 def value_at(tree: Any, *keys: str) -> Any:

@@ -62,19 +62,16 @@ def program_ends() -> bool:
     return False
 
 
-def uninterrupted(
-    work: Callable[..., Result], /, *given: Any, end: Callable[[BaseException], object] | None = None
-) -> Result:
+def uninterrupted(work: Callable[..., Result], /, *given: Any) -> Result:
     """Return the result of work in a separate thread, which is not interrupted; this thread waits.
 
     Python handles Ctrl-C and other signals only in its main thread. So their exceptions are never raised inside
-    a library that ignores them (h5py) or that continues in threads of its own (Zarr): the interrupted work has
+    a library that continues in threads of its own (Zarr): the interrupted work has
     finished when the exception is raised here.
 
     Args:
         work: called with the arguments.
         given: the arguments.
-        end: called with an exception that is raised here in the meantime, so that long work ends early.
 
     Raises:
         BaseException: an exception of the work, or, after the work, one that was raised here in the meantime.
@@ -83,8 +80,6 @@ def uninterrupted(
         try:
             done: Future[Result] = worker.submit(work, *given)
             return done.result()
-        except BaseException as error:
-            if end is not None:
-                end(error)
+        except BaseException:
             worker.shutdown()
             raise

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 import os
+import re
 import sys
 import threading
 from collections.abc import Sequence
+from importlib.util import find_spec
 
 from cyclopts import App, CycloptsError, Group, Parameter
 from cyclopts.exceptions import MissingArgumentError, UnknownCommandError, UnusedCliTokensError
@@ -16,190 +19,56 @@ from vcc.base.errors import InputError
 from vcc.cli.console import notes, say
 from vcc.cli.synth.views_file import with_views
 
-COMMANDS = {
-    "capture": (
-        "Capture the image that a camera records of a light field.\n\n"
-        "For a sensor with photodiodes, the image of each is written next to the output, as NAME_ROW_COLUMN.",
-        'vcc capture camera.toml views/ -o picture.png --spacing "1 mm"',
-        "vcc capture camera.toml views/ -o picture.exr --interpolation cubic",
-        "vcc capture camera.toml scene.zarr -o picture.exr --executor processes",
-        'vcc capture camera.toml video.zarr -o picture.png --start "0.2 s" --exposure-time "20 ms"',
-        'vcc capture moving.toml views/ -o picture.png --exposure-time "90 ms"',
-    ),
-    "expose": (
-        "Record a light field as a real sensor would: photons, electrons, noise, raw numbers.\n\n"
-        "The camera file describes the sensor in a table sensor.electronics. For a sensor with photodiodes, the "
-        "recording of each is written next to the output, as NAME_ROW_COLUMN.",
-        'vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1',
-        "vcc expose camera.toml views/ -o raw.npy --picture picture.png",
-    ),
-    "explain": (
-        "Report how an image is made, what it costs, and which limits apply.",
-        "vcc explain camera.toml views/",
-    ),
-    "info": (
-        "Report views, geometry, disparities and brightness of a light field, and what is unknown.",
-        "vcc info views/",
-        "vcc info views/ --quick",
-        "vcc info views/ --picture grid.png",
-        "vcc info mosaic.png --views 9 9",
-        'vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"',
-    ),
-    "plot": (
-        "Draw a camera from the side with rays, or the path of a light field through it in phase space.",
-        "vcc plot camera.toml -o camera.svg",
-        "vcc plot camera.toml --phase-space --light-field views/",
-    ),
-    "sweep": (
-        "Capture the images of many cameras: a camera file with varied parameters.\n\n"
-        "Images and a table are saved in a Zarr group for xarray; the same command resumes an interrupted sweep.",
-        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" --set "code.pattern=mura,circle" -o all.zarr',
-        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness',
-        'vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv',
-    ),
-    "dataset": (
-        "Make pairs of recordings and ground truth, for training.\n\n"
-        "Each pair has a camera of the design, a window of its sensor, an exposure and noise of its own. The "
-        "card, README.md, says how the set was made.",
-        'vcc dataset camera.toml scene.zarr -o pairs --set "code.pattern=mura,circle" --count 400 --crop 256 256',
-        'vcc dataset camera.toml one.zarr two.zarr -o pairs --set "sensor.z=50mm:54mm" --design sobol '
-        '--cameras 512 --sharp --depth --flips --exposure "1ms:20ms"',
-    ),
-    "bench": (
-        "Open the optical bench in the browser: move elements and see the image change.\n\n"
-        "Without a camera and a light field it opens a lens before the demo's scene.",
-        "vcc bench",
-        "vcc bench --gallery plenoptic",
-        "vcc bench camera.toml views/",
-        "vcc bench room.ply",
-    ),
-    "demo": (
-        "Run the paper's examples and its own check, and explain them on a page of pictures.\n\n"
-        "It takes about 20 seconds on two cores, and about 10 with --small.",
-        "vcc demo --small",
-        "vcc demo --light-field views/",
-    ),
-    "convert": (
-        "Convert a light field to a store (Zarr), or to files of another format.\n\n"
-        "A store keeps samples bit for bit, with their cameras. It opens at once and is read in parts, so that a "
-        "capture fits in any memory (--memory-limit). It appears when it is complete.",
-        'vcc convert views/ scene.zarr --spacing "1 mm"',
-        "vcc convert views/ small.zarr --lossy jpegxl --quality 90",
-        "vcc convert scene.zarr half.zarr --dtype float16",
-        "vcc convert scene.zarr flight.mp4",
-        'vcc convert my_photographs/ field.zarr --unit "10 cm" --distances "1.4 m, 3 m"',
-        'vcc convert take/ video.zarr --frame-rate 24 --spacing "1 mm"',
-    ),
-    "decode": (
-        "Turn the raw recording of a plenoptic or mask-modulated camera into a light field.\n\n"
-        "The positions of lenslets' micro-images come from --centres, --white or --camera. For a mask of cosines, "
-        "the carriers come from --camera.",
-        "vcc decode raw.tif --camera camera.toml -o field.zarr",
-        "vcc decode raw.tif --white white.tif --dark dark.tif --views 9 -o views",
-        "vcc decode photo.lfp --white white.lfp -o field.zarr",
-        "vcc decode raw.png --centres centres.csv --color-filter BGGR -o field.zarr",
-    ),
-    "refocus": (
-        "Refocus a light field at one distance, at many, or at all.",
-        'vcc refocus views/ --distance "1.2 m" -o picture.png',
-        'vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4',
-        "vcc refocus views/ --all-in-focus -o sharp.png",
-    ),
-    "spectrum": (
-        "Draw the spectrum of a light field: where its detail lies in frequency, and how optics would shear it.",
-        "vcc spectrum views/ -o spectrum.png",
-        "vcc spectrum scene.zarr -o section.svg --across vt --of section",
-    ),
-    "gallery": (
-        "Rebuild a published camera, from optics to decoded result, and compare it with its claims.",
-        "vcc gallery",
-        "vcc gallery wavefront-coding",
-        "vcc gallery biprism-stereo --light-field views/ -o stereo",
-    ),
-}
-"""Help text and examples by name. ``vcc NAME`` is the function NAME in ``vcc.cli.NAME``."""
-
-RENDERERS = {
-    "mitsuba": (
-        "Render any scene of Mitsuba 3. Its own sensor defines the position and direction of the middle view.",
-        'vcc synth mitsuba scene.xml -o out.zarr --views 20 20 --pixels 500 500 --aperture "20 mm" '
-        '--field-of-view "40 deg" --focus-distance "1.3 m" --samples 64',
-    ),
-    "demo": (
-        "Render a built-in scene with Mitsuba: glass, gold and gloss, at several depths.\n\n"
-        "The example takes about two minutes on two cores, and three times as long without LLVM 16 or newer.",
-        "vcc synth demo still-life -o still-life.zarr --views 9 9 --pixels 200 300",
-    ),
-    "planes": (
-        "Render pictures on planes, the nearer ones before the others.",
-        "vcc synth planes -o leaves.zarr",
-        'vcc synth planes -o two.zarr --plane "leaf.png, 0.8 m, 30 cm" --plane "town.jpg, 3 m, 2 m"',
-    ),
-    "pbrt": (
-        "Render a scene of PBRT by the program pbrt (on the PATH, or named by PBRT in the environment).",
-        "vcc synth pbrt scene.pbrt -o out.zarr --views 9 9 --pixels 400 600 --samples 128",
-    ),
-    "blender-script": (
-        "Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry.",
-        'vcc synth blender-script -o views.py --views 9 9 --aperture "40 mm"',
-        "blender scene.blend --background --python views.py",
-    ),
-    "depth": (
-        "Make the views around a picture from its depth; hidden parts behind edges are filled in.",
-        'vcc synth depth room.png room-depth.exr -o room.zarr --field-of-view "60 deg"',
-        'vcc synth depth kinect.png kinect-depth.png -o out.zarr --depth-unit "1 mm"',
-        'vcc synth depth view.png disparity.pfm -o out.zarr --meaning disparity --focus-distance "4 m"',
-    ),
-    "opengl": (
-        "Draw meshes with OpenGL, textured and simply lit: fast, without shadows, mirrors and glass.",
-        'vcc synth opengl teapot.glb -o teapot.zarr --field-of-view "40 deg"',
-        'vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"',
-    ),
-    "splats": (
-        "Render Gaussian splats: true views with occlusion, and the disparities of the middle one.\n\n"
-        "--look lists cameras of the scene and draws a contact sheet of what they see.",
-        "vcc synth splats room.ply --look",
-        "vcc synth splats room.ply -o room.zarr --camera 3 --parallax 1",
-        "vcc synth splats garden.ply -o garden.zarr --camera-from cameras.json --camera 12 --views 9 9",
-        "vcc synth splats garden.ply views.toml -o garden.zarr --executor processes",
-    ),
-}
-"""Likewise: ``vcc synth NAME`` is the function NAME in ``vcc.cli.synth.NAME``."""
-
-ZOO = {
-    "run": (
-        "Score cameras, scenes and decoders for a task, with controls of the same light.\n\n"
-        "Results are kept by content: the same command resumes an interrupted run, and a new camera or decoder "
-        "adds only its own results.",
-        "vcc zoo run --task edof -o zoo.zarr",
-        "vcc zoo run --task edof -o zoo.zarr --camera my.toml --decoder my.py:decode",
-        "vcc zoo run --task light-field -o zoo.zarr --seeds 3",
-        "vcc zoo run --task depth -o zoo.zarr --scene leaves-7 --scene views.zarr --executor processes",
-    ),
-    "table": (
-        "Print the table of a run, with standard errors over scenes and the gains over controls.",
-        "vcc zoo table zoo.zarr",
-        "vcc zoo table zoo.zarr --task depth -o scores.csv",
-    ),
-    "page": (
-        "Write a page of a run: tables, quality over light, and a strip of pictures.",
-        "vcc zoo page zoo.zarr -o page",
-    ),
-    "design": (
-        "Learn an aperture code and its decoder together, and decoders of its controls: the round stop of its "
-        "light, a random code, and the open square.\n\n"
-        "The code can be made: it is binary and symmetric, and has an exact number of open cells and no smaller "
-        "hole or bar than stated. The same command resumes an interrupted design. vcc zoo run scores it.",
-        "vcc zoo design --task edof -o design",
-        "vcc zoo design --task edof -o design --light 0.1 --symmetry left-right --seeds 5",
-    ),
-}
-"""Likewise: ``vcc zoo NAME`` is the function NAME in ``vcc.cli.zoo.NAME``."""
+COMMANDS = (
+    "capture",
+    "expose",
+    "explain",
+    "info",
+    "plot",
+    "sweep",
+    "dataset",
+    "bench",
+    "demo",
+    "convert",
+    "decode",
+    "refocus",
+    "spectrum",
+    "gallery",
+)
+"""``vcc NAME`` is the function NAME in ``vcc.cli.NAME``; its docstring is its help."""
+RENDERERS = (
+    "mitsuba",
+    "demo",
+    "planes",
+    "pbrt",
+    "blender-script",
+    "depth",
+    "opengl",
+    "splats",
+)
+"""Likewise ``vcc synth NAME`` in ``vcc.cli.synth.NAME``."""
+ZOO = (
+    "run",
+    "table",
+    "page",
+    "design",
+)
+"""Likewise ``vcc zoo NAME`` in ``vcc.cli.zoo.NAME``."""
 
 
-def _commands(
-    name: str, package: str, commands: dict[str, tuple[str, ...]], help: str, epilogue: str, place: int = 0
-) -> App:
+def documented(package: str, command: str) -> tuple[str, list[str]]:
+    """The help text and the examples of a command: its docstring, without an import, which takes a second."""
+    name = command.replace("-", "_")
+    spec = find_spec(f"{package}.{name}")
+    source = spec.loader.get_source(spec.name) if spec is not None else None  # type: ignore[union-attr]
+    found = re.search(rf'^def {name}\(.*?"""(.*?)"""', source or "", re.DOTALL | re.MULTILINE)
+    assert found is not None, f"{package}.{name} has no function {name} with a docstring"
+    about, _, rest = inspect.cleandoc(found[1]).partition("\n\nExamples:\n")
+    listed = rest.partition("\n\n")[0].replace("\n        ", " ")  # lines that go on are indented further
+    return about, [line.strip() for line in listed.splitlines()]
+
+
+def _commands(name: str, package: str, commands: Sequence[str], help: str, epilogue: str, place: int = 0) -> App:
     """An app whose commands are loaded on demand and listed in the order given."""
     made = App(
         name=name,
@@ -214,8 +83,8 @@ def _commands(
     )
     for flag in (*made.help_flags, *made.version_flags):
         made[flag].group = "Options"
-    for number, (command, (words, *examples)) in enumerate(commands.items()):
-        function = command.replace("-", "_")
+    for number, command in enumerate(commands):
+        function, (words, examples) = command.replace("-", "_"), documented(package, command)
         made.command(
             f"{package}.{function}:{function}",
             name=command,

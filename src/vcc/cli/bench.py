@@ -47,8 +47,17 @@ def bench(
 ) -> None:
     """Open the optical bench in the browser: move elements and see the image change.
 
-    A scene of Gaussian splats (.ply, .splat, .spz, .glb) is rendered in few coarse views at first, and then in 9×9
-    views of 320 pixels along the longer side. Without a camera, the lens focuses in the middle of its depth.
+    Without a camera and a light field it opens a lens before the demo's scene.
+
+    A scene of Gaussian splats (.ply, .splat, .spz, .glb) is rendered in few coarse views at first, and then
+    in 9×9 views of 320 pixels along the longer side. Without a camera, the lens focuses in the middle of its
+    depth.
+
+    Examples:
+        vcc bench
+        vcc bench --gallery plenoptic
+        vcc bench camera.toml views/
+        vcc bench room.ply
 
     Args:
         host: The address to listen on. With any other than this machine's own, other machines can connect;

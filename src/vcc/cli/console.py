@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from vcc.base.errors import CacheWarning, InputError, ResultWarning
 from vcc.base.progress import Progress
-from vcc.files.atomic import atomic_path
+from vcc.files.atomic import atomic_path, check_parent, check_target
 
 Part = TypeVar("Part")
 
@@ -138,11 +138,16 @@ DRAWINGS = (".png", ".svg", ".pdf")
 """File endings of drawings."""
 
 
-def save_figure(figure: Any, path: Path) -> None:
-    """Write a Matplotlib figure, and print its path."""
+def saved_figure(figure: Any, path: Path) -> str:
+    """Write a Matplotlib figure, and return a message."""
     with atomic_path(path) as temporary:
         figure.savefig(temporary)
-    show(f"{path}: written")
+    return f"{path}: written"
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a Matplotlib figure, and print a message."""
+    show(saved_figure(figure, path))
 
 
 def by_photodiode(output: Path, photodiodes: Sequence[Sequence[Part]]) -> Iterator[tuple[Path, Part]]:
@@ -163,23 +168,16 @@ def check_output(path: Path, endings: tuple[str, ...]) -> Path:
         InputError: another ending, a folder that does not exist or is not writable, or a path that is a folder.
     """
     path = path.expanduser()
-    if path.suffix.lower() not in endings:
-        raise InputError(f'"{path.name}" cannot be written: end its name in {", ".join(endings)}')
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {folder}; make it first")
-    if path.is_dir():
-        raise InputError(f"{path} is a folder: give the name of a file")
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{path} cannot be written: no permission to write to {folder}")
+    if path.suffix.lower() not in endings:  # not by `checks`, which loads NumPy: help is fast
+        raise InputError(f'the output cannot be written as "{path.name}": end its name in {", ".join(endings)}')
+    check_target(path)
     return path
 
 
 def free_output(output: Path, overwrite: bool) -> Path:
     """The path of an output that does not exist yet or may be replaced, checked before the work starts."""
     output = output.expanduser()
-    if not output.parent.is_dir():
-        raise InputError(f"{output} cannot be written: there is no folder {output.parent}; make it first")
+    check_parent(output)
     if output.exists() and not overwrite:
         raise InputError(f"{output} is there already: choose another name, or replace it with --overwrite")
     return output

@@ -25,15 +25,14 @@ from vcc.cli.options import (
     Length,
     Lengths,
     LightFieldFile,
+    Number,
     OutputFile,
     Overwrite,
     Reading,
     ViewExposure,
     Whole,
-    above_zero,
     exposed,
     given_options,
-    quantity,
 )
 from vcc.cli.store_words import video_written, written
 from vcc.formats import open_unstructured, read_geometry
@@ -102,7 +101,7 @@ class Posing:
     distances: Lengths | None = None
     pixels: Counts | None = None
     images: Annotated[Path | None, Parameter(metavar="FOLDER")] = None
-    off_plane: Annotated[float | None, quantity("NUMBER", above_zero)] = None
+    off_plane: Number | None = None
 
     def on_grid(self, path: Path, reading: Reading) -> LightField:
         """The photographs at a path as a light field; their share of missing pixels is a warning.
@@ -142,14 +141,25 @@ def convert(
     kind: FileKind | None = None,
     exposure: ViewExposure = 1.0,
     overwrite: Overwrite = False,
-    frame_rate: Annotated[float | None, quantity("NUMBER", above_zero)] = None,
+    frame_rate: Number | None = None,
     storing: Storing = Storing(),
     reading: Reading = Reading(),
     posing: Posing = Posing(),
 ) -> None:
     """Convert a light field to a store (Zarr), or to files of another format.
 
+    A store keeps samples bit for bit, with their cameras. It opens at once and is read in parts, so that a
+    capture fits in any memory (--memory-limit). It appears when it is complete.
+
     Photographs with poses (COLMAP, transforms.json) are resampled onto a grid of views.
+
+    Examples:
+        vcc convert views/ scene.zarr --spacing "1 mm"
+        vcc convert views/ small.zarr --lossy jpegxl --quality 90
+        vcc convert scene.zarr half.zarr --dtype float16
+        vcc convert scene.zarr flight.mp4
+        vcc convert my_photographs/ field.zarr --unit "10 cm" --distances "1.4 m, 3 m"
+        vcc convert take/ video.zarr --frame-rate 24 --spacing "1 mm"
 
     Args:
         frame_rate: Frames per second: make a video from LIGHT_FIELD, a folder with one light field per frame

@@ -9,13 +9,12 @@ from cyclopts import Group, Parameter
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import progress, show
-from vcc.cli.executing import Executing, Who
+from vcc.cli.executing import Who, opened
 from vcc.cli.options import (
-    MAKING,
     CameraFile,
     Counts,
-    Given,
     Making,
+    Number,
     Output,
     Whole,
     above_zero,
@@ -57,7 +56,7 @@ Factors = Annotated[tuple[float, float], quantity("LOW HIGH", above_zero, tokens
 
 @Parameter(name="*", group=DRAWING)
 @dataclass(frozen=True, kw_only=True)
-class Drawing(Given):
+class Drawing:
     """What is drawn for each pair, from the seed and its number alone.
 
     Args:
@@ -83,7 +82,7 @@ class Drawing(Given):
     gain: Factors | None = None
     color_gain: Factors | None = None
     exposure: Annotated[Times, quantity("auto|TIME|TIME:TIME", _times)] = "auto"
-    radiance: Annotated[float, quantity("NUMBER", above_zero)] = 1.0
+    radiance: Number = 1.0
     seed: Whole = 0
 
     @property
@@ -104,7 +103,7 @@ class Drawing(Given):
 
 @Parameter(name="*", group=TRUTH)
 @dataclass(frozen=True, kw_only=True)
-class Truth(Given):
+class Truth:
     """Ground truth, on the same pixels as the recordings.
 
     Args:
@@ -128,25 +127,6 @@ class Truth(Given):
         return {"truth": asked, "psf_distances": self.psf or (), "psf_size": self.psf_size}
 
 
-@Parameter(name="*", group=MAKING)
-@dataclass(frozen=True, kw_only=True)
-class MakingShards(Executing):
-    """The executor that makes the shards.
-
-    Args:
-        executor: What makes the shards: `processes` or `threads`, one per core of this machine, or a Dask cluster
-            by its scheduler, "dask://host:8786", whose workers see the same disk. Each task uses one thread.
-            `none`: one pair after the other.
-    """
-
-    executor: Who = "processes"
-
-    @property
-    def named(self) -> Executing:
-        """The executor, None for "none"."""
-        return Executing() if self.executor == "none" else self
-
-
 def dataset(
     camera: CameraFile,
     /,
@@ -159,9 +139,17 @@ def dataset(
     drawing: Drawing = Drawing(),
     truth: Truth = Truth(),
     how: Making = Making(),
-    executing: MakingShards = MakingShards(),
+    executor: Who = "processes",
 ) -> None:
     """Make pairs of recordings and ground truth, for training.
+
+    Each pair has a camera of the design, a window of its sensor, an exposure and noise of its own. The card,
+    README.md, says how the set was made.
+
+    Examples:
+        vcc dataset camera.toml scene.zarr -o pairs --set "code.pattern=mura,circle" --count 400 --crop 256 256
+        vcc dataset camera.toml one.zarr two.zarr -o pairs --set "sensor.z=50mm:54mm" --design sobol --cameras
+            512 --sharp --depth --flips --exposure "1ms:20ms"
 
     Args:
         output: A new folder for the pairs and the card; the same command resumes an interrupted run.
@@ -169,9 +157,10 @@ def dataset(
         per_shard: Number of pairs in a shard, which one task makes.
         kind: Files of the pairs: `webdataset`, tar files; `zarr`, a Zarr group.
         licence: Of the data set, for its card.
+        executor: What makes the shards: `processes` or `threads`, one per core of this machine, or a Dask cluster
+            by its scheduler, "dask://host:8786", whose workers see the same disk. Each task uses one thread.
+            `none`: one pair after the other.
     """
-    who = executing.named
-    who.check_name()
     if not scenes:
         raise InputError("give at least one scene, a store: vcc dataset camera.toml scene.zarr -o pairs")
     optics = load_camera(camera)
@@ -183,14 +172,14 @@ def dataset(
         "kind": kind,
         "licence": licence or "",
     }
-    with who.opened() as executor, progress("Recording pairs") as advance:
+    with opened(executor) as running, progress("Recording pairs") as advance:
         made = make_dataset(
             output,
             optics,
             list(scenes),
             drawing.cameras_of(camera.parent),
             how,
-            executor=executor,
+            executor=running,
             progress=advance,
             **options,
         )

@@ -49,7 +49,17 @@ def decode(
     cosines: Cosines = Cosines(),
     written: Written = Written(),
 ) -> None:
-    """Turn the raw recording of a plenoptic or mask-modulated camera into a light field."""
+    """Turn the raw recording of a plenoptic or mask-modulated camera into a light field.
+
+    The positions of lenslets' micro-images come from --centres, --white or --camera. For a mask of cosines,
+    the carriers come from --camera.
+
+    Examples:
+        vcc decode raw.tif --camera camera.toml -o field.zarr
+        vcc decode raw.tif --white white.tif --dark dark.tif --views 9 -o views
+        vcc decode photo.lfp --white white.lfp -o field.zarr
+        vcc decode raw.png --centres centres.csv --color-filter BGGR -o field.zarr
+    """
     output = free_output(output, written.overwrite)
     exposed(written.exposure, kind_of(output, written.kind))  # check the output before the work
     camera = None if recorded.camera is None else load_camera(recorded.camera)

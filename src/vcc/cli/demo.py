@@ -1,21 +1,25 @@
 """``vcc demo``: the paper's examples."""
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from vcc.cli.console import make_folder
+from vcc.cli.options import OutputFolder, ShownLightField
 from vcc.demo import run_demo
 
 
 def demo(
     *,
-    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")] = Path("vcc-demo"),
-    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
+    output: OutputFolder = Path("vcc-demo"),
+    light_field: ShownLightField | None = None,
     small: bool = False,
 ) -> None:
     """Run the paper's examples and its own check, and explain them on a page of pictures.
+
+    It takes about 20 seconds on two cores, and about 10 with --small.
+
+    Examples:
+        vcc demo --small
+        vcc demo --light-field views/
 
     Args:
         output: Folder for the pictures.

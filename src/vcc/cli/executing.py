@@ -5,7 +5,6 @@ import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,7 +13,7 @@ from cyclopts import Parameter
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.cli.options import MAKING
+from vcc.cli.options import MAKING, quantity
 from vcc.plan.how import cores
 from vcc.store import is_store
 
@@ -23,59 +22,54 @@ CONNECTING = 10.0
 """Seconds to wait for a scheduler."""
 
 
-Who = Annotated[str | None, Parameter(metavar="EXECUTOR")]
+def _name(text: str, option: str) -> str | None:
+    """The name of an executor, None for "none".
 
-
-@Parameter(name="*", group=MAKING)
-@dataclass(frozen=True, kw_only=True)
-class Executing:
-    """The executor of the blocks of a light field.
-
-    Args:
-        executor: For a light field in a store: what reads and processes its blocks. `processes` or `threads`,
-            one per core of this machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task
-            uses one thread and a memory limit of its own. Default: one block after the other, each on all
-            cores.
+    Raises:
+        InputError: there is no such executor.
     """
+    if text not in ("none", "processes", "threads") and not text.startswith(DASK):
+        raise InputError(f'{option} is processes, threads or "{DASK}host:8786", not {text!r}')
+    return None if text == "none" else text
 
-    executor: Who = None
 
-    def check_name(self) -> None:
-        """Check the name of the executor.
+Who = Annotated[str | None, quantity("EXECUTOR", _name), Parameter(group=MAKING)]
+OfBlocks = Annotated[
+    Who,
+    Parameter(
+        help="For a light field in a store: what reads and processes its blocks. `processes` or `threads`, one "
+        'per core of this machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one '
+        "thread and a memory limit of its own. Default: one block after the other, each on all cores."
+    ),
+]
 
-        Raises:
-            InputError: there is no such executor.
-        """
-        if self.executor not in (None, "processes", "threads") and not self.executor.startswith(DASK):
-            raise InputError(f'--executor is processes, threads or "{DASK}host:8786", not {self.executor!r}')
 
-    def check(self, light_field: Path) -> None:
-        """Check the options before the light field is read.
+def check_blocks(executor: str | None, light_field: Path) -> None:
+    """Check, before a light field is read, that an executor can read it in blocks.
 
-        Raises:
-            InputError: no such executor, or a light field that is not in a store.
-        """
-        self.check_name()
-        if self.executor is not None and not is_store(light_field):
-            raise InputError(
-                f"--executor requires a light field in a store, and {light_field} is not a store: convert it with "
-                f"vcc convert {light_field} scene.zarr, or leave --executor out"
-            )
+    Raises:
+        InputError: the light field is not in a store.
+    """
+    if executor is not None and not is_store(light_field):
+        raise InputError(
+            f"--executor requires a light field in a store, and {light_field} is not a store: convert it with "
+            f"vcc convert {light_field} scene.zarr, or leave --executor out"
+        )
 
-    @contextmanager
-    def opened(self) -> Iterator[Any]:
-        """The executor, open within the context; None if none is selected.
 
-        Raises:
-            InputError: Dask is not installed, or its scheduler does not answer.
-        """
-        if self.executor is None:
-            yield None
-        else:
-            kinds = {"threads": _threads, "processes": _processes}
-            opened = kinds.get(self.executor) or partial(_client, self.executor.removeprefix(DASK))
-            with opened() as executor:
-                yield executor
+@contextmanager
+def opened(executor: str | None) -> Iterator[Any]:
+    """The executor of this name, open within the context; None if none is selected.
+
+    Raises:
+        InputError: no scheduler answers at the address.
+    """
+    if executor is None:
+        yield None
+        return
+    kinds = {"threads": _threads, "processes": _processes}
+    with (kinds.get(executor) or partial(_client, executor.removeprefix(DASK)))() as found:
+        yield found
 
 
 @contextmanager

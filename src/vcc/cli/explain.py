@@ -1,7 +1,7 @@
 """``vcc explain``: how an image would be made."""
 
 from vcc.cli.console import show
-from vcc.cli.executing import Executing
+from vcc.cli.executing import OfBlocks, check_blocks, opened
 from vcc.cli.options import CameraFile, LightFieldFile, Making, Reading
 from vcc.motion import load_moving_camera
 
@@ -12,12 +12,16 @@ def explain(
     /,
     *,
     how: Making = Making(),
-    executing: Executing = Executing(),
+    executor: OfBlocks = None,
     reading: Reading = Reading(),
 ) -> None:
-    """Report how an image is made, what it costs, and which limits apply."""
+    """Report how an image is made, what it costs, and which limits apply.
+
+    Examples:
+        vcc explain camera.toml views/
+    """
     moving = load_moving_camera(camera)
-    executing.check(light_field)
+    check_blocks(executor, light_field)
     field = reading.light_field(light_field)
-    with executing.opened() as executor:
-        show(str(moving.explain(field, how, executor=executor)))
+    with opened(executor) as running:
+        show(str(moving.explain(field, how, executor=running)))

@@ -1,15 +1,10 @@
 """``vcc expose``: the recording of a real sensor."""
 
-from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
-
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import by_photodiode, check_output, show
-from vcc.cli.executing import Executing
-from vcc.cli.options import CameraFile, LightFieldFile, Making, Output, Reading, Time, Whole
+from vcc.cli.executing import OfBlocks, check_blocks, opened
+from vcc.cli.options import CameraFile, File, LightFieldFile, Making, Output, Reading, Time, Whole
 from vcc.files.pictures import RAW_ENDINGS, WRITE_ENDINGS
 from vcc.recording import PhotodiodeRecording
 
@@ -23,12 +18,19 @@ def expose(
     exposure: Time = "auto",
     seed: Whole = 0,
     radiance: float = 1.0,
-    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    picture: File | None = None,
     how: Making = Making(),
-    executing: Executing = Executing(),
+    executor: OfBlocks = None,
     reading: Reading = Reading(),
 ) -> None:
     """Record a light field as a real sensor would: photons, electrons, noise, raw numbers.
+
+    The camera file describes the sensor in a table sensor.electronics. For a sensor with photodiodes, the
+    recording of each is written next to the output, as NAME_ROW_COLUMN.
+
+    Examples:
+        vcc expose camera.toml views/ -o raw.tif --exposure "10 ms" --seed 1
+        vcc expose camera.toml views/ -o raw.npy --picture picture.png
 
     Args:
         output: The raw numbers, .tif, .png or .npy: linear, not scaled, upside down as recorded.
@@ -46,11 +48,11 @@ def expose(
             f"{camera} has no sensor electronics: add a table [sensor.electronics], which may be empty for an "
             "ordinary sensor. vcc capture computes irradiance without it"
         )
-    executing.check(light_field)
+    check_blocks(executor, light_field)
     field = reading.light_field(light_field)
-    with executing.opened() as executor:
+    with opened(executor) as running:
         recording = optics.expose(
-            field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how, executor=executor
+            field, exposure, seed=seed, radiance=radiance, ray_seed=how.seed, how=how, executor=running
         )
     show(recording.save(output).description)
     if isinstance(recording, PhotodiodeRecording):

@@ -1,11 +1,9 @@
 """``vcc gallery``: published cameras, listed or rebuilt."""
 
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from vcc.cli.console import make_folder, progress, show
+from vcc.cli.options import OutputFolder, ShownLightField
 from vcc.gallery import entries, entry, write_entry
 
 
@@ -13,10 +11,15 @@ def gallery(
     name: str | None = None,
     /,
     *,
-    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
-    output: Annotated[Path | None, Parameter(alias="-o", metavar="FOLDER")] = None,
+    light_field: ShownLightField | None = None,
+    output: OutputFolder | None = None,
 ) -> None:
     """Rebuild a published camera, from optics to decoded result, and compare it with its claims.
+
+    Examples:
+        vcc gallery
+        vcc gallery wavefront-coding
+        vcc gallery biprism-stereo --light-field views/ -o stereo
 
     Args:
         name: Name of a camera. Without it, all are listed.

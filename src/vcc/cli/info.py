@@ -5,10 +5,9 @@ import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from cyclopts import Parameter
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError, ResultWarning
@@ -17,7 +16,7 @@ from vcc.base.units import short
 from vcc.base.wavelengths import as_text
 from vcc.cli.brightness import brightness
 from vcc.cli.console import DRAWINGS, check_output, show
-from vcc.cli.options import Arrangement, LightFieldFile, Reading, ViewCameras, given_options
+from vcc.cli.options import Arrangement, File, LightFieldFile, Reading, ViewCameras, given_options
 from vcc.cli.store_words import looked_at, places_of, store_facts, video_facts
 from vcc.cli.view_grid import Views, draw
 from vcc.fields.grid import SAMPLES_IN_WORDS, pair
@@ -37,12 +36,19 @@ def info(
     /,
     *,
     quick: bool = False,
-    picture: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    picture: File | None = None,
     keep: bool = False,
     cameras: ViewCameras = ViewCameras(),
     arrangement: Arrangement = Arrangement(),
 ) -> None:
     """Report views, geometry, disparities and brightness of a light field, and what is unknown.
+
+    Examples:
+        vcc info views/
+        vcc info views/ --quick
+        vcc info views/ --picture grid.png
+        vcc info mosaic.png --views 9 9
+        vcc info views/ --keep --spacing "2 mm" --slope-per-pixel 0.0012 --focus-distance "1.3 m"
 
     Args:
         quick: Read one view only: nothing is measured, and views are not compared.

@@ -17,6 +17,7 @@ from cyclopts import Group, Parameter, Token
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.base.reading import number
 from vcc.base.units import parse, short
 from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.cli.console import as_options, progress
@@ -80,11 +81,8 @@ def memory_size(text: str, option: str = "--memory-limit") -> int:
         InputError: no unit, or not a size above 0.
     """
     units = {"kb": 1e3, "mb": 1e6, "gb": 1e9, "tb": 1e12, "kib": 2**10, "mib": 2**20, "gib": 2**30, "tib": 2**40}
-    number, unit = text.strip().rstrip("BbiIkKmMgGtT"), text.strip().lstrip("0123456789.eE+- ")
-    try:
-        size = float(number) * units[unit.lower()]
-    except (ValueError, KeyError):
-        size = math.nan
+    count, unit = text.strip().rstrip("BbiIkKmMgGtT"), text.strip().lstrip("0123456789.eE+- ")
+    size = number(count) * units.get(unit.lower(), math.nan)
     if not (size >= 1 and math.isfinite(size)):
         raise InputError(f'{option} is "{text}": a size has a number and a unit, like "800 MB" or "1.5 GiB"')
     return int(size)
@@ -96,13 +94,10 @@ def above_zero(text: str, option: str) -> float:
     Raises:
         InputError: anything else.
     """
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not (number > 0 and math.isfinite(number)):
+    found = number(text)
+    if not (found > 0 and math.isfinite(found)):
         raise InputError(f'{option} is "{text}": it is a number above 0, like 0.8')
-    return number
+    return found
 
 
 def whole_number(text: str, option: str) -> int:
@@ -180,6 +175,7 @@ Wavelengths = Annotated[
     tuple[float, ...],
     quantity("LENGTH,…", wavelengths, written=lambda given: ", ".join(short(each) for each in given)),
 ]
+Number = Annotated[float, quantity("NUMBER", above_zero)]
 Whole = Annotated[int, quantity("NUMBER", whole_number)]
 Counts = Annotated[
     tuple[int, int], quantity("ROWS COLUMNS", whole_number, tokens=2, written=lambda two: "{} {}".format(*two))
@@ -192,6 +188,8 @@ CameraFile = Annotated[Path, Parameter(help="The camera file, .toml.")]
 LightFieldFile = Annotated[Path, Parameter(help="A folder of views, a file or a store.")]
 Output = Annotated[Path, Parameter(alias="-o", metavar="FILE")]
 File = Annotated[Path, Parameter(metavar="FILE")]
+OutputFolder = Annotated[Path, Parameter(alias="-o", metavar="FOLDER")]
+ShownLightField = Annotated[Path, Parameter(metavar="LIGHT_FIELD")]
 OutputFile = Annotated[
     Path,
     Parameter(

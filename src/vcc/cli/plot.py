@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import DRAWINGS, check_output, save_figure
-from vcc.cli.options import CameraFile, Output, Reading, length, quantity
+from vcc.cli.options import CameraFile, Output, Reading, ShownLightField, length, quantity
 from vcc.plot import plot_camera, plot_phase_space_stages
 
 
@@ -19,12 +19,16 @@ def plot(
     output: Output | None = None,
     object_distance: Annotated[tuple[float, ...] | None, quantity("LENGTH", length, repeated=True)] = None,
     across: Literal["x", "y"] = "x",
-    light_field: Annotated[Path | None, Parameter(metavar="LIGHT_FIELD")] = None,
+    light_field: ShownLightField | None = None,
     phase_space: bool = False,
     slice: Annotated[str | None, Parameter(metavar="NAMES")] = None,
     reading: Reading = Reading(),
 ) -> None:
     """Draw a camera from the side with rays, or the path of a light field through it in phase space.
+
+    Examples:
+        vcc plot camera.toml -o camera.svg
+        vcc plot camera.toml --phase-space --light-field views/
 
     Args:
         output: The drawing, .png, .svg or .pdf. Default: the camera file's name with .png, in the current

@@ -60,6 +60,11 @@ def refocus(
 ) -> None:
     """Refocus a light field at one distance, at many, or at all.
 
+    Examples:
+        vcc refocus views/ --distance "1.2 m" -o picture.png
+        vcc refocus views/ --stack "0.8 m" "3 m" 12 -o stack.mp4
+        vcc refocus views/ --all-in-focus -o sharp.png
+
     Args:
         output: An image, .png, .tif, .exr or .npy; for a focal stack a film, .mp4 or .gif.
         distance: Where to focus, "1.2 m", or inf.

@@ -22,6 +22,10 @@ def spectrum(
 ) -> None:
     """Draw the spectrum of a light field: where its detail lies in frequency, and how optics would shear it.
 
+    Examples:
+        vcc spectrum views/ -o spectrum.png
+        vcc spectrum scene.zarr -o section.svg --across vt --of section
+
     Args:
         output: The drawing, .png, .svg or .pdf.
         across: The two coordinates; the frequency of the first is horizontal.

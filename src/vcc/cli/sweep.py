@@ -9,18 +9,17 @@ from cyclopts import Group, Parameter
 from vcc.base.errors import InputError
 from vcc.camera_file import load_camera
 from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
-from vcc.cli.executing import Executing, Who
+from vcc.cli.executing import Who, opened
 from vcc.cli.options import (
-    MAKING,
     CameraFile,
-    Given,
+    File,
     Length,
     LightFieldFile,
     Making,
+    Number,
     Output,
     Reading,
     Whole,
-    above_zero,
     quantity,
 )
 from vcc.fields.samples import Samples
@@ -56,7 +55,7 @@ def setting(text: str, option: str) -> tuple[str, str]:
 
 @Parameter(name="*", group=TOLD)
 @dataclass(frozen=True, kw_only=True)
-class Told(Given):
+class Told:
     """Columns of the table, in addition to each image's mean, missing rays and sampling error.
 
     Args:
@@ -68,9 +67,9 @@ class Told(Given):
     """
 
     sharpness: bool = False
-    target: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    target: File | None = None
     deblurring: Length | None = None
-    noise: Annotated[float, quantity("NUMBER", above_zero)] = 0.01
+    noise: Number = 0.01
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -83,34 +82,19 @@ class Told(Given):
         return found
 
 
-@Parameter(name="*", group=MAKING)
-@dataclass(frozen=True, kw_only=True)
-class MakingMany(Executing):
-    """The executor that makes the images.
+def _check_portable(light_field: Samples, path: Path) -> None:
+    """Check that a light field in memory is small enough to be sent to tasks.
 
-    Args:
-        executor: What makes the images, some cameras per task: `processes` or `threads`, one per core of this
-            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread and a
-            memory limit of its own. The light field must be in a store, or take at most 64 MiB. Default: one
-            camera after the other, on all cores.
+    Raises:
+        InputError: it is too large.
     """
-
-    executor: Who = None
-
-    def check_portable(self, light_field: Samples, path: Path) -> None:
-        """Check that a light field in memory is small enough to be sent to tasks.
-
-        Raises:
-            InputError: it is too large.
-        """
-        try:
-            if self.executor is not None:
-                check_portable(light_field)
-        except InputError as error:
-            raise InputError(
-                f"{path} is too large to be sent to all tasks: convert it with vcc convert {path} scene.zarr to a "
-                "store, which each task reads itself, or leave --executor out"
-            ) from error
+    try:
+        check_portable(light_field)
+    except InputError as error:
+        raise InputError(
+            f"{path} is too large to be sent to all tasks: convert it with vcc convert {path} scene.zarr to a "
+            "store, which each task reads itself, or leave --executor out"
+        ) from error
 
 
 def sweep(
@@ -123,14 +107,21 @@ def sweep(
     design: Kind = "grid",
     count: Whole | None = None,
     seed: Whole = 0,
-    table: Annotated[Path | None, Parameter(metavar="FILE")] = None,
-    sheet: Annotated[Path | None, Parameter(metavar="FILE")] = None,
+    table: File | None = None,
+    sheet: File | None = None,
     told: Told = Told(),
     how: Making = Making(),
-    executing: MakingMany = MakingMany(),
+    executor: Who = None,
     reading: Reading = Reading(),
 ) -> None:
     """Capture the images of many cameras: a camera file with varied parameters.
+
+    Images and a table are saved in a Zarr group for xarray; the same command resumes an interrupted sweep.
+
+    Examples:
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" --set "code.pattern=mura,circle" -o all.zarr
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm" --design sobol -o table.csv --sharpness
+        vcc sweep camera.toml views/ --set "sensor.z=50mm:54mm:9" -o all.zarr --sheet all.png --table all.csv
 
     Args:
         set: A parameter, named by its element and its own name, and its values: a range
@@ -144,6 +135,10 @@ def sweep(
         seed: Of the draw.
         table: Also write the table here, .csv or .parquet.
         sheet: Draw the images side by side, .png, .svg or .pdf.
+        executor: What makes the images, some cameras per task: `processes` or `threads`, one per core of this
+            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread and a
+            memory limit of its own. The light field must be in a store, or take at most 64 MiB. Default: one
+            camera after the other, on all cores.
     """
     settings = by_name(set)
     output = check_output(output, (".zarr", *ENDINGS)) if output.suffix != ".zarr" else output.expanduser()
@@ -152,15 +147,15 @@ def sweep(
     sheet = None if sheet is None else check_output(sheet, DRAWINGS)
     if sheet is not None and not stored:
         raise InputError("--sheet shows images, and a table alone keeps none: let --output end in .zarr")
-    executing.check_name()
     optics = load_camera(camera)
     asked = Design(settings, design, count, seed, camera.parent)
     asked.of(optics)  # checked before the light field is read
     field, metrics = reading.light_field(light_field), told.metrics
-    executing.check_portable(field, light_field)
+    if executor is not None:
+        _check_portable(field, light_field)
     kept = {"output": output} if stored else {"pictures": False}
-    with executing.opened() as executor, progress("Sweeping") as advance:
-        swept = swept_by(optics, field, asked, how, metrics=metrics, executor=executor, progress=advance, **kept)
+    with opened(executor) as running, progress("Sweeping") as advance:
+        swept = swept_by(optics, field, asked, how, metrics=metrics, executor=running, progress=advance, **kept)
     if stored:
         sizes = "×".join(map(str, swept.pictures.shape[len(swept.shape) :]))
         show(f"{output}: {len(swept)} pictures of {sizes}, {' × '.join(swept.axes)}")

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from vcc.base.errors import InputError
 from vcc.base.reading import expanded
-from vcc.cli.options import MAKING, Given, above_zero, duration, given_options, quantity
+from vcc.cli.options import MAKING, Number, duration, given_options, quantity
 from vcc.motion.moving_camera import TOLERANCE
 from vcc.store import StoredVideo, is_video
 
@@ -17,7 +17,7 @@ Duration = Annotated[float, quantity("TIME", duration)]
 
 @Parameter(name="*", group=MAKING)
 @dataclass(frozen=True, kw_only=True)
-class Timing(Given):
+class Timing:
     """When the shutter is open, for a video or a time-varying camera.
 
     Args:
@@ -29,7 +29,7 @@ class Timing(Given):
 
     start: Duration | None = None
     exposure_time: Duration | None = None
-    time_tolerance: Annotated[float, quantity("NUMBER", above_zero)] = TOLERANCE
+    time_tolerance: Number = TOLERANCE
 
     def check(self, light_field: Path, camera: Path, moves: bool) -> None:
         """Check the combination of options before anything is read.

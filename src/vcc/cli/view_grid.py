@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
+from vcc.cli.console import saved_figure
 from vcc.files import transfer as curves
-from vcc.files.atomic import atomic_path
-from vcc.files.pictures import auto_exposure
+from vcc.files.pictures import auto_exposure, averaged
 from vcc.plot.style import NOTHING, SMALL, TEXT, TITLE, new_axes
 
 if TYPE_CHECKING:
@@ -53,9 +53,7 @@ class Views:
 def draw(views: Views, title: str, path: Path, assumed: bool) -> str:
     """Write the drawing of the grid of views, and return a message."""
     figure = grid_figure(views.at, views.shape, views.frame, views.transfer, title, assumed)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary)
-    return f"{path}: written"
+    return saved_figure(figure, path)
 
 
 def grid_figure(
@@ -133,16 +131,12 @@ def _small(view: NDArray[Any], shape: tuple[int, int], transfer: str) -> NDArray
     """Linear light of a view, averaged over blocks of pixels so that all views fit on a sheet."""
     room = np.clip(_SHEET / max(shape), _SMALLEST, _LARGEST)
     step = max(1, math.ceil(max(view.shape[:2]) / room))
-    height, width = (max(1, n // step) for n in view.shape[:2])
-    piece = view[: height * step, : width * step]
-    if piece.dtype in (np.uint8, np.uint16) and transfer == "srgb":
-        light = curves.decode(piece)
+    if view.dtype in (np.uint8, np.uint16) and transfer == "srgb":
+        light = curves.decode(view)
     else:
-        full = np.iinfo(piece.dtype).max if piece.dtype.kind == "u" else 1
-        light = piece.astype(np.float32) / np.float32(full)
-    light = light.reshape(light.shape[0], light.shape[1], -1)
-    step_y, step_x = light.shape[0] // height, light.shape[1] // width
-    light = light.reshape(height, step_y, width, step_x, light.shape[2]).mean(axis=(1, 3))
+        full = np.iinfo(view.dtype).max if view.dtype.kind == "u" else 1
+        light = view.astype(np.float32) / np.float32(full)
+    light = averaged(light.reshape(*light.shape[:2], -1), step)
     if light.shape[2] != 3:
         light = np.repeat(light.mean(axis=2, keepdims=True), 3, axis=2)  # not displayable as colours
     return light

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from contextlib import suppress
@@ -18,8 +17,8 @@ from vcc.base.errors import InputError
 from vcc.camera import Camera
 from vcc.dataset.card import CAMERA
 from vcc.dataset.recording_pairs import Pair
-from vcc.files.atomic import refusal
-from vcc.files.parts import clear_folder, part_of
+from vcc.files.atomic import atomic_folder
+from vcc.files.parts import clear_folder
 
 CARD, README = "dataset.json", "README.md"
 
@@ -96,19 +95,13 @@ class Destination(Brief, ABC):
         Raises:
             InputError: the disk reports an error.
         """
-        part = part_of(self.path)
-        try:
+        with atomic_folder(self.path) as part:
             part.mkdir()
             (part / CARD).write_text(json.dumps(self.card, indent=1, ensure_ascii=False), encoding="utf-8")
             (part / README).write_text(text, encoding="utf-8")
             with suppress(InputError):
                 camera.save(part / CAMERA)
             self.prepare(part, first)
-            part.rename(self.path)
-        except OSError as error:
-            raise InputError(f"{self.path} cannot be made: {refusal(error, part)}") from error
-        finally:
-            shutil.rmtree(part, ignore_errors=True)
 
     def clear(self, patience: float) -> None:
         """Remove what killed writers left in the folder; see `vcc.files.parts.clear_folder`."""

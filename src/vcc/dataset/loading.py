@@ -21,6 +21,7 @@ from vcc.dataset.destination import CARD, Destination
 from vcc.dataset.recipe import MOST_PAIRS
 from vcc.dataset.shards import Shards
 from vcc.dataset.zarr_group import GROUP, ZarrGroup
+from vcc.store.attributes import check_version
 
 Numbers = Literal["radiance", "digital"]
 
@@ -137,10 +138,7 @@ def destination_at(path: Path) -> Destination:
     if not all(type(each) is int and each > 0 for each in counts):
         raise InputError(f"{file} is not the card of a data set, or is damaged: its counts are {counts}")
     version, pairs, per_shard, shards = (each or 0 for each in counts)
-    if version > FORMAT_VERSION:
-        raise InputError(
-            f"{file} has format_version {version}, and this vcc reads {FORMAT_VERSION}: use a newer vcc"
-        )
+    check_version(file, version, FORMAT_VERSION)
     arrays = card.get("arrays")
     stated = isinstance(arrays, dict) and all(
         isinstance(each, dict) and "shape" in each for each in arrays.values()

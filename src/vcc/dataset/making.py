@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
-from vcc.base.notices import Notices
+from vcc.base.notices import Notices, worked_elsewhere
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import expanded
 from vcc.camera import Camera
@@ -25,6 +25,7 @@ from vcc.dataset.scenes import scenes_of
 from vcc.dataset.shards import Shards
 from vcc.dataset.zarr_group import ZarrGroup
 from vcc.fields.samples import InMemory
+from vcc.files.atomic import check_parent
 from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
 from vcc.plan.how import How
@@ -149,8 +150,7 @@ def make_dataset(
     if executor is not None:
         vars(_local).clear()  # the scene: workers open their own
     check_name(path)
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be made: there is no folder {path.parent}; make it first")
+    check_parent(path)
     disk, remarks = KINDS[kind](path, card), Notices()
     lock = WriterLock(path)
     try:
@@ -293,10 +293,5 @@ def _opened(scene: Any) -> Opened:
 
 def _written_elsewhere(shared: tuple[Shard, int], shard: int) -> Notices:
     """A shard as a task; returns its warnings, unless it runs in a thread of the process that asks."""
-    (work, asking), remarks = shared, Notices()
-    if os.getpid() == asking:
-        work.write(shard)
-        return remarks
-    with remarks.gathered():
-        work.write(shard)
-    return remarks
+    work, asking = shared
+    return worked_elsewhere(lambda: work.write(shard), asking)[1]

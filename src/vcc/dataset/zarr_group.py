@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.reading import MOST_UNPACKED, check_file, reading
+from vcc.base.reading import check_file, reading
 from vcc.base.workers import uninterrupted
 from vcc.dataset.destination import Destination
 from vcc.dataset.recording_pairs import Pair
 from vcc.files.atomic import refusal
-from vcc.store.zarr_chunks import check_size
+from vcc.store.zarr_chunks import chunk_file, opened_array
 
 GROUP, KEY = "pairs.zarr", "dataset"
 LAST = "pair"
@@ -124,7 +124,7 @@ class ZarrGroup(Destination):
     def _chunk(self, name: str, place: int, pairs: int) -> NDArray[Any]:
         """A chunk of so many pairs, checked before it is read."""
         array = self._array(name, "r")
-        file = self.group / name / str(array.metadata.encode_chunk_key((place, *(0,) * (array.ndim - 1))))
+        file = chunk_file(self.group / name, array, (place,))
         check_file(file, "chunk of pairs")
         with reading(file, "a chunk of pairs"):
             size = math.prod(array.chunks) * array.dtype.itemsize + CHECKSUM
@@ -146,11 +146,8 @@ class ZarrGroup(Destination):
         import zarr
 
         where = self.group / name / "zarr.json"
-        check_file(where, "array of pairs")
-        check_size(where, MOST_UNPACKED)
+        array = opened_array(self.group, name, "array of pairs", mode)
         with reading(where, "an array of pairs"):
-            store = zarr.storage.LocalStore(self.group, read_only=mode == "r")
-            array = zarr.open_array(store=store, path=name, mode=mode, zarr_format=3)
             stated = self.card["arrays"].get(name)
             if stated is not None:
                 layout = self._layout(stated["shape"], stated["dtype"], 1)

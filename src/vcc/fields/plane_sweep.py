@@ -259,27 +259,24 @@ class _Coarser:
         return np.asarray(parts.mean(axis=(3, 5), dtype=np.float32))
 
 
-def disparity_maps(
-    light_field: Views, *, memory_limit: int | None = None, progress: Progress | None = None
-) -> DisparityMaps:
+def disparity_maps(light_field: Views, *, progress: Progress | None = None) -> DisparityMaps:
     """The disparities for views in between: from a plane sweep, of the middle view.
 
     A light field calls this when ``between_views="depth"`` first needs its disparities, and caches the result.
 
     Args:
         light_field: in memory, or stored: then its middle row and column of views are read.
-        memory_limit: see `vcc.recover.depth_by_plane_sweep`.
         progress: see `vcc.recover.depth_by_plane_sweep`.
 
     Raises:
         InputError: as there; the message suggests passing the disparities with the light field.
     """
     try:
-        low, high = ends = range_of_sweep(light_field, None, memory_limit)
+        low, high = ends = range_of_sweep(light_field, None)
         # Neighbouring views are half a view from the views in between: a parabola through steps of this
         # size estimates disparities to a hundredth or two of a pixel, which is half of that on the sensor.
         step = max(FINEST_STEP, (high - low) / MOST_STEPS)
-        found = plane_sweep(light_field, ends, step=step, memory_limit=memory_limit, progress=progress)
+        found = plane_sweep(light_field, ends, step=step, progress=progress)
     except InputError as error:
         raise InputError(
             f"disparities between views cannot be found: {error}. Or give them: vcc.LightField(…, disparity=maps)"

@@ -32,7 +32,7 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
             write (no space, no permission).
     """
     target = Path(os.path.realpath(path))  # a symbolic link stays; its target is replaced
-    _check_target(target)
+    check_target(target)
     temporary = part_of(target)
     try:
         clear_leftovers(target)
@@ -43,6 +43,29 @@ def atomic_path(path: str | PathLike[str]) -> Iterator[Path]:
         raise InputError(f"{target} could not be written: {refusal(error, temporary)}. {kept}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(target: Path) -> Iterator[Path]:
+    """Yield a name for a new folder next to ``target``; rename the folder to ``target`` if the block succeeds.
+
+    The block makes the folder. If it fails, nothing is left behind. An empty folder at ``target`` is replaced.
+
+    Raises:
+        InputError: there is no parent folder, or the system refuses to write.
+    """
+    check_parent(target)
+    part = part_of(target)
+    try:
+        yield part
+        if target.is_dir():
+            target.rmdir()
+        part.replace(target)
+    except OSError as error:
+        reason = refusal(error, part)
+        raise InputError(f"{target} could not be written: {reason}. Nothing of it is kept") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
 
 
 def refusal(error: OSError, part: Path) -> str:
@@ -91,20 +114,33 @@ def _megabytes(count: int) -> str:
     return f"{count / 1e6:.3g}"
 
 
-def _check_target(target: Path) -> None:
-    folder = target.parent
+def check_target(target: Path) -> None:
+    """Check that a file can be written.
+
+    Raises:
+        InputError: the folder does not exist or is not writable, or ``target`` is a folder or has too long a name.
+    """
     check_name(target)
-    if not folder.exists():
-        raise InputError(
-            f"{target.name} cannot be written: the folder {folder} does not exist. "
-            f'Make it first (mkdir -p "{folder}") or choose another'
-        )
-    if not folder.is_dir():
-        raise InputError(f"{target} cannot be written: {folder} is a file, not a folder")
+    check_parent(target)
     if target.is_dir():
         raise InputError(f"{target} is a folder: give the name of a file in it")
-    if not os.access(folder, os.W_OK):
+    if not os.access(target.parent, os.W_OK):
         raise InputError(
             f"{target.name} cannot be written: there is no permission to write to the folder "
-            f"{folder}. Choose another folder"
+            f"{target.parent}. Choose another folder"
+        )
+
+
+def check_parent(target: Path) -> None:
+    """Raise if the folder of a target does not exist.
+
+    Raises:
+        InputError: it does not, or it is a file.
+    """
+    folder = target.parent
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{target} cannot be written: {folder} is a file, not a folder")
+    if not folder.is_dir():
+        raise InputError(
+            f"{target} cannot be written: there is no folder {folder}; make it first, or choose another"
         )

@@ -13,7 +13,7 @@ import types
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Union, get_args, get_origin
+from typing import Any, ClassVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -135,36 +135,58 @@ FAMILIES = (
 )
 
 
+def _length(default: Any = None) -> Any:
+    """A field of lengths."""
+    return dataclasses.field(default=default, metadata={"unit": "length"})
+
+
 @dataclasses.dataclass(frozen=True)
-class _LensFile:
-    """`vcc.load_lens` as stored in a camera file: a real lens in a separate lens file."""
+class _InLensFile:
+    """`vcc.load_lens` in a camera file: a lens in a separate file. Lenses are saved with their own fields."""
 
     lens_file: str
-    stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    z: float = _length(0.0)
+    decentre: tuple[float, float] = _length((0.0, 0.0))
+    name: str = ""
+    wavelength: float | None = _length()
+
+    model: ClassVar[Any]
+    """As in `vcc.load_lens`."""
+
+    def made(self, folder: Path) -> Element:
+        fields = dataclasses.fields(self)[1:]
+        given = {field.name: value for field in fields if (value := getattr(self, field.name)) is not None}
+        lens: Element = load_lens(folder / expanded(self.lens_file), model=self.model, **given)
+        return lens
+
+    @classmethod
+    def of(cls, lens: Any, folder: Path) -> _InLensFile | None:
+        """The form that reads as an equal lens; None if there is none."""
+        return None
+
+
+@dataclasses.dataclass(frozen=True)
+class _LensFile(_InLensFile):
+    """A lens by its first-order optics; it is saved by the name of its file."""
+
+    stop_diameter: float | None = _length()
     f_number: float | None = None
-    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
     glasses: dict[str, float] | None = None
     rims: bool = False
     z_of: str = "first surface"
-    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
-    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
-    name: str = ""
 
-    def made(self, folder: Path) -> FirstOrder:
-        given = {
-            field.name: getattr(self, field.name)
-            for field in dataclasses.fields(self)[1:]
-            if getattr(self, field.name) is not None
-        }
-        lens: FirstOrder = load_lens(folder / expanded(self.lens_file), **given)
-        return dataclasses.replace(lens, source=self.lens_file)
+    model: ClassVar[Any] = "first order"
+
+    def made(self, folder: Path) -> Element:
+        return dataclasses.replace(super().made(folder), source=self.lens_file)  # type: ignore[call-arg]
 
     @classmethod
     def of(cls, lens: FirstOrder, folder: Path) -> _LensFile | None:
         """The form that reads as an equal lens; None if the lens has no file, or its file is gone or differs."""
-        rims = lens.exit_diameter is not None
+        placed: dict[str, Any] = {"z": lens.z, "decentre": lens.decentre, "name": lens.name}
         for stop, z_of in itertools.product((None, lens.stop_diameter), get_args(Reference)):
-            form = cls(lens.source, stop, rims=rims, z_of=z_of, z=lens.z, decentre=lens.decentre, name=lens.name)
+            rims = lens.exit_diameter is not None
+            form = cls(lens.source, **placed, stop_diameter=stop, rims=rims, z_of=z_of)
             try:
                 with warnings.catch_warnings():  # a wide stop was warned about on first reading
                     warnings.simplefilter("ignore")
@@ -176,13 +198,11 @@ class _LensFile:
 
 
 @dataclasses.dataclass(frozen=True)
-class _RealLensFile:
-    """`vcc.load_lens` with ``model="real"`` in a camera file; it is saved with its surfaces."""
+class _RealLensFile(_InLensFile):
+    """A lens by its surfaces."""
 
-    lens_file: str
-    stop_diameter: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    stop_diameter: float | None = _length()
     f_number: float | None = None
-    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
     glasses: dict[str, float] | None = None
     configuration: int | None = None
     z_of: str = "first surface"
@@ -190,41 +210,19 @@ class _RealLensFile:
     radiometry: str = "exact"
     transmission: float | tuple[float, ...] = 1.0
     fresnel: bool = False
-    softness: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
-    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
-    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
-    name: str = ""
+    softness: float = _length(0.0)
 
-    def made(self, folder: Path) -> RealLens:
-        fields = dataclasses.fields(self)[1:]
-        given = {field.name: value for field in fields if (value := getattr(self, field.name)) is not None}
-        return load_lens(folder / expanded(self.lens_file), model="real", **given)
-
-    @classmethod
-    def of(cls, lens: RealLens, folder: Path) -> None:
-        return None
+    model: ClassVar[Any] = "real"
 
 
 @dataclasses.dataclass(frozen=True)
-class _RayTableFile:
-    """`vcc.load_lens` with ``model="ray table"`` in a camera file; it is saved with its rays."""
+class _RayTableFile(_InLensFile):
+    """A lens by a table of its rays."""
 
-    lens_file: str
-    wavelength: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
-    accuracy: float | None = dataclasses.field(default=None, metadata={"unit": "length"})
+    accuracy: float | None = _length()
     radiometry: str = "exact"
-    z: float = dataclasses.field(default=0.0, metadata={"unit": "length"})
-    decentre: tuple[float, float] = dataclasses.field(default=(0.0, 0.0), metadata={"unit": "length"})
-    name: str = ""
 
-    def made(self, folder: Path) -> RayTableLens:
-        fields = dataclasses.fields(self)[1:]
-        given = {field.name: value for field in fields if (value := getattr(self, field.name)) is not None}
-        return load_lens(folder / expanded(self.lens_file), model="ray table", **given)
-
-    @classmethod
-    def of(cls, lens: RayTableLens, folder: Path) -> None:
-        return None
+    model: ClassVar[Any] = "ray table"
 
 
 FROM_FILES: dict[type[Element], Any] = {

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
+from vcc.base.reading import number
 from vcc.base.wavelengths import wavelength
 
 ENDINGS = (".img", ".bsq", ".bil", ".bip")
@@ -81,14 +82,10 @@ def wavelengths_of(path: Path) -> tuple[float, ...] | None:
     stated = fields["wavelength"].strip("{} \n\t").split(",")
     if len(stated) != _whole(fields, "bands"):
         raise InputError(f"its ENVI header states {len(stated)} wavelengths for {fields['bands'][:20]} bands")
-    found = []
-    for number in stated:
-        try:
-            value = float(number)
-        except ValueError:
-            value = float("nan")
-        found.append(wavelength(f"wavelength {number.strip()[:20]!r} of its ENVI header", value * _UNITS[unit]))
-    return tuple(found)
+    return tuple(
+        wavelength(f"wavelength {each.strip()[:20]!r} of its ENVI header", number(each) * _UNITS[unit])
+        for each in stated
+    )
 
 
 def _header_of(path: Path) -> dict[str, str]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.reading import expanded, read_bytes
+from vcc.base.reading import expanded, number, read_bytes
 
 _SPACE = rb"(?:\s|#[^\n]*\n)+"
 _HEADER = re.compile(rb"P([56])" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,18})" + _SPACE + rb"(\d{1,9})\s")
@@ -61,12 +61,7 @@ def read_pfm(path: str | PathLike[str]) -> NDArray[np.float32]:
     path = expanded(path)
     data = read_bytes(path)
     match = _HEADER_OF_FLOATS.match(data)
-    scale = math.nan
-    if match is not None:
-        try:
-            scale = float(match[4])
-        except ValueError:
-            scale = math.nan
+    scale = math.nan if match is None else number(match[4].decode("latin-1"))
     if match is None or not (math.isfinite(scale) and scale != 0):
         raise InputError(
             f'{path} is not a PFM file: it begins with {data[:12]!r} and not with "Pf", size and scale'

@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from vcc.base.errors import InputError, ResultWarning
+from vcc.base.reading import number
 from vcc.base.wavelengths import wavelength
 from vcc.files.envi import ENDINGS as ENVI
 from vcc.files.envi import wavelengths_of
@@ -75,18 +76,15 @@ def emission_wavelengths(text: str) -> tuple[float, ...] | None:
             )
         return None
     found = []
-    for one, number in zip(channels, stated, strict=True):
+    for one, given in zip(channels, stated, strict=True):
         unit = one.get("EmissionWavelengthUnit", "nm")
         if unit not in _UNITS:
             known = ", ".join(_UNITS)
             raise InputError(
                 f"the unit of an emission wavelength in its OME-XML is {unit[:20]!r}, not one of {known}"
             )
-        try:
-            value = float(number or "")
-        except ValueError:
-            value = float("nan")
-        found.append(wavelength(f"EmissionWavelength {str(number)[:20]!r} of its OME-XML", value * _UNITS[unit]))
+        name = f"EmissionWavelength {str(given)[:20]!r} of its OME-XML"
+        found.append(wavelength(name, number(given) * _UNITS[unit]))
     return tuple(found)
 
 

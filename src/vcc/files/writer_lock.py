@@ -46,7 +46,7 @@ class WriterLock:
 
     def __init__(self, target: Path) -> None:
         target = Path(os.path.realpath(target))
-        self._file = lock_of(target)
+        self._file, self._target = lock_of(target), target
         with _one_thread:
             earlier = _locks.pop(self._file, None)
             if earlier is not None:
@@ -59,6 +59,21 @@ class WriterLock:
     def held(self) -> bool:
         """Whether the lock is still held."""
         return self._let_go.alive
+
+    def check(self, maker: str) -> None:
+        """Check that the lock is still held.
+
+        Args:
+            maker: function that makes a writer, for the error.
+
+        Raises:
+            InputError: it was released, or replaced by a later one.
+        """
+        if not self.held:
+            raise InputError(
+                f"this writer of {self._target} has ended: its with block is over, or another was made since. Use "
+                f"that, or make one by {maker}"
+            )
 
     @property
     def patience(self) -> float:

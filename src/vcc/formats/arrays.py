@@ -23,13 +23,12 @@ from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.filling import Filling
-from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path
 from vcc.files.declared_sizes import LIGHT_FIELD, check_declared_size
 from vcc.files.npy import read_npy
-from vcc.formats.grid import Decoded, Geometry
+from vcc.formats.grid import Decoded, Geometry, stated_range, stated_sample
 
 ENDINGS = (".npy", ".npz")
 
@@ -82,10 +81,10 @@ def read(
     return Decoded(
         format="NumPy array" if path.suffix.lower() == ".npy" else "NumPy arrays (.npz)",
         values=values,
-        transfer=_transfer(arrays.get("transfer"), values, path),
+        transfer=_transfer(_scalar(arrays.get("transfer")), values, path),
         geometry=Geometry(
-            disparity_range=_disparity_range(arrays.get("disparity_range"), path),
-            sample=_sample(arrays.get("sample"), path),
+            disparity_range=stated_range(arrays.get("disparity_range"), f'{path}: its "disparity_range"'),
+            sample=stated_sample(_scalar(arrays.get("sample")), f'{path}: its "sample"'),
             wavelengths=_wavelengths(arrays.get("wavelengths"), values, path),
             filling=_filling(arrays, values, path),
         ),
@@ -246,22 +245,17 @@ def _ordered(values: NDArray[Any], axes: str | None, path: Path) -> NDArray[Any]
     return np.transpose(values, [axes.index(name) for name in _ORDER if name in axes])
 
 
-def _transfer(stated: NDArray[Any] | None, values: NDArray[Any], path: Path) -> Literal["srgb", "linear"]:
+def _scalar(stated: NDArray[Any] | None) -> Any:
+    """The text of an array of one; of others, their values, for errors."""
+    return None if stated is None else stated.tolist()
+
+
+def _transfer(stated: Any, values: NDArray[Any], path: Path) -> Literal["srgb", "linear"]:
     if stated is None:
         return "linear" if values.dtype.kind == "f" else "srgb"
-    if stated.shape == () and stated.item() == "linear":
-        return "linear"
-    if stated.shape == () and stated.item() == "srgb":
-        return "srgb"
-    raise InputError(f'{path}: its "transfer" is {stated.tolist()!r}; "linear" and "srgb" are known')
-
-
-def _sample(stated: NDArray[Any] | None, path: Path) -> Sample:
-    if stated is None or (stated.shape == () and stated.item() == "mean"):
-        return "mean"
-    if stated.shape == () and stated.item() == "point":
-        return "point"
-    raise InputError(f'{path}: its "sample" is {stated.tolist()!r}; "mean" and "point" are known')
+    if stated not in ("linear", "srgb"):
+        raise InputError(f'{path}: its "transfer" is {stated!r}; "linear" and "srgb" are known')
+    return "linear" if stated == "linear" else "srgb"
 
 
 def _filling(arrays: dict[str, NDArray[Any]], values: NDArray[Any], path: Path) -> Filling | None:
@@ -290,11 +284,3 @@ def _frame(stated: NDArray[Any] | None, axes_as_stored: bool, path: Path) -> Aff
         return Affine(stated)
     except (InputError, ValueError, TypeError) as error:
         raise InputError(f'{path}: its "frame" is wrong: {error}') from None
-
-
-def _disparity_range(stated: NDArray[Any] | None, path: Path) -> tuple[float, float] | None:
-    if stated is None:
-        return None
-    if stated.shape != (2,) or stated.dtype.kind not in "fiu" or not stated[0] <= stated[1]:
-        raise InputError(f'{path}: its "disparity_range" is {stated.tolist()!r}, not two numbers, lowest first')
-    return float(stated[0]), float(stated[1])

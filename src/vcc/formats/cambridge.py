@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vcc.base.errors import InputError
-from vcc.base.reading import read_bytes
+from vcc.base.reading import number, read_bytes
 from vcc.formats.grid import Geometry
 
 PARAMETERS = "param.txt"
@@ -68,10 +68,7 @@ def read_parameters(folder: Path) -> Parameters | None:
     for name in ("num_x", "num_y", "base_x", "base_y"):
         if name not in stated:
             raise InputError(f"{path} does not state {name}. Add a line such as {name}: 9")
-        try:
-            values[name] = float(stated[name])
-        except ValueError:
-            values[name] = math.nan
+        values[name] = number(stated[name])
         if not 0 < values[name] < math.inf or (name.startswith("num") and values[name] % 1):
             raise InputError(f'{path}: {name} is "{stated[name]}", and must be a number above 0')
     return Parameters((int(values["num_y"]), int(values["num_x"])), (values["base_y"], values["base_x"]))

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from vcc.base import checks
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.reading import check_path, expanded, reading
@@ -61,11 +62,7 @@ def read_container(path: Path, progress: Progress | None = None, **options: Any)
 
 def _read(module: ModuleType, path: Path, progress: Progress | None, options: dict[str, Any]) -> Decoded:
     parameters = inspect.signature(module.read).parameters
-    taken = [key for key in parameters if key not in ("path", "progress")]
-    for option in options:
-        if option not in taken:
-            takes = f"takes {', '.join(taken)}" if taken else "takes no options"
-            raise InputError(f"{path}: {option}= is not supported by this format, which {takes}")
+    checks.options_of(module.read, options, ("path", "progress"), "this format")
     if "progress" in parameters:
         options["progress"] = progress
     decoded: Decoded = module.read(path, **options)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,34 @@ class Decoded(Brief):
     weights: NDArray[Any] | None = None
     notices: tuple[str, ...] = ()
     metadata: dict[str, Any] = field(default_factory=dict)
+
+
+def stated_sample(stated: Any, where: str) -> Sample:
+    """The meaning of samples that a file states as text; None is the mean over a pixel.
+
+    Raises:
+        InputError: another text.
+    """
+    if stated is None:
+        return "mean"
+    sample: Sample | None = next((known for known in get_args(Sample) if stated == known), None)
+    if sample is None:
+        raise InputError(f'{where} is {stated!r}; "mean" and "point" are known')
+    return sample
+
+
+def stated_range(stated: NDArray[Any] | None, where: str) -> tuple[float, float] | None:
+    """(lowest, highest) disparity that a file states, pixels per view; None if it does not.
+
+    Raises:
+        InputError: not two finite numbers, the lowest first.
+    """
+    if stated is None:
+        return None
+    given = stated.ravel()
+    if given.size != 2 or given.dtype.kind not in "fiu" or not -math.inf < given[0] <= given[1] < math.inf:
+        raise InputError(f"{where} is {given[:3].tolist()}, not two numbers, lowest first")
+    return float(given[0]), float(given[1])
 
 
 def weights_apart(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float32]]:

@@ -12,12 +12,12 @@ from pathlib import Path
 
 from vcc.base import checks
 from vcc.base.errors import InputError
-from vcc.base.reading import read_bytes, read_text
+from vcc.base.reading import number, read_bytes, read_text
 from vcc.base.units import mm, nm
 from vcc.base.wavelengths import wavelengths as all_checked
 from vcc.fields.grid import Sample
 from vcc.formats.cameras import Cameras
-from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in
+from vcc.formats.grid import Geometry, Place, ViewGrid, arrange, pictures_in, stated_sample
 
 PARAMETERS = "parameters.cfg"
 KIND = "HCI 4D light-field benchmark"
@@ -41,7 +41,7 @@ def find(folder: Path, *, sparse: bool = False) -> ViewGrid | None:
         return None
     stated = read_grid_shape(folder)
     rows, columns = stated or _square(list(numbered.values()), folder)
-    places = [Place(number // columns, number % columns, file) for file, number in numbered.items()]
+    places = [Place(n // columns, n % columns, file) for file, n in numbered.items()]
     files = arrange(places, folder, (range(rows), range(columns)), sparse=sparse)
     return ViewGrid(KIND, files, read_geometry(folder) or Geometry())
 
@@ -97,7 +97,7 @@ def read_geometry(folder: Path) -> Geometry | None:
         focus_distance=focus if focus > 0 else math.inf,
         disparity_range=(low, high) if low <= high else None,  # NaN if not stated
         picture_shape=(int(height), int(width)),
-        sample=_sample(settings, folder),
+        sample=stated_sample(settings.get("meta", "sample", fallback=None), f"{parameters_file(folder)}: sample"),
         wavelengths=_wavelengths(settings, folder),
     )
 
@@ -169,16 +169,6 @@ def parameters_file(folder: Path) -> Path | None:
     return others[0] if others else None
 
 
-def _sample(settings: configparser.ConfigParser, folder: Path) -> Sample:
-    """Read the additional entry of this package for samples that are not means over pixels."""
-    stated = settings.get("meta", "sample", fallback="mean")
-    if stated == "mean":
-        return "mean"
-    if stated == "point":
-        return "point"
-    raise InputError(f'{parameters_file(folder)}: sample is "{stated}"; "mean" and "point" are known')
-
-
 def _wavelengths(settings: configparser.ConfigParser, folder: Path) -> tuple[float, ...] | None:
     """An entry of ours: nanometres, one for each channel."""
     stated = settings.get("meta", "wavelengths_nm", fallback=None)
@@ -186,7 +176,7 @@ def _wavelengths(settings: configparser.ConfigParser, folder: Path) -> tuple[flo
         return None
     place = f"{parameters_file(folder)}: wavelengths_nm"
     try:
-        given = [float(number) * nm for number in stated.replace(",", " ").split()]
+        given = [float(each) * nm for each in stated.replace(",", " ").split()]
     except ValueError:
         raise InputError(f'{place} is "{stated}": write numbers, such as 610, 540, 465') from None
     return all_checked(place, given)
@@ -218,10 +208,7 @@ def _number(
         if not required:
             return math.nan
         raise InputError(f"{parameters_file(folder)} does not state {key} in its section [{section}]. Add it")
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    value = number(text)
     if not math.isfinite(value):
         raise InputError(f'{parameters_file(folder)}: {key} is "{text}", not a number')
     return value

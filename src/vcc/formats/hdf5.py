@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -63,6 +63,21 @@ def opened(path: Path) -> Iterator[Any]:
         raise InputError(
             f"{path} cannot be read: it is truncated or damaged ({error}). Copy it again from where it came from"
         ) from error
+
+
+def made_in_memory(fill: Callable[[Any], None], **options: Any) -> Any:
+    """The bytes of a new HDF5 file behind its user block.
+
+    Made in memory, because HDF5 and h5py do not report each error of the disk, and drop exceptions.
+
+    Args:
+        fill: writes into the open file.
+        options: of ``h5py.File``.
+    """
+    with library().File("in memory", "w", driver="core", backing_store=False, **options) as file:
+        fill(file)
+        file.flush()
+        return file.id.get_file_image()
 
 
 def number(found: dict[str, Any], name: str, path: Path) -> float:

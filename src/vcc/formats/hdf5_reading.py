@@ -53,29 +53,15 @@ def found(parent: Any, name: str, path: Path) -> Any:
     return at
 
 
-def group(parent: Any, name: str, path: Path) -> Any:
-    """The group of this name; None if there is none.
-
-    Raises:
-        InputError: the object is not a group; or as in `found`.
-    """
-    return _of_kind(hdf5.library().Group, "not a group", parent, name, path)
-
-
 def dataset(parent: Any, name: str, path: Path) -> Any:
     """The data set of this name, without its data; None if there is none.
 
     Raises:
-        InputError: the object is not a data set; or as in `found`.
+        InputError: a link is in the way, or a group has this name.
     """
-    return _of_kind(hdf5.library().Dataset, "a group, not a data set", parent, name, path)
-
-
-def _of_kind(kind: type, otherwise: str, parent: Any, name: str, path: Path) -> Any:
-    """The object of this name; raises with ``otherwise`` if it has another kind; None if there is none."""
     at = found(parent, name, path)
-    if at is not None and not isinstance(at, kind):
-        raise InputError(f"{path}: {name} is {otherwise}")
+    if at is not None and not isinstance(at, hdf5.library().Dataset):
+        raise InputError(f"{path}: {name} is a group, not a data set")
     return at
 
 

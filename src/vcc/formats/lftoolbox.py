@@ -8,7 +8,6 @@ the scene is a slope −u of the light in this package.
 
 from __future__ import annotations
 
-import math
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -24,8 +23,7 @@ from vcc.fields.samples import Samples
 from vcc.fields.view_arrays import all_samples
 from vcc.files.atomic import atomic_path
 from vcc.formats import hdf5, hdf5_reading
-from vcc.formats.grid import Decoded, Geometry, weights_apart
-from vcc.formats.hdf5_writing import Put, write_file
+from vcc.formats.grid import Decoded, Geometry, stated_range, weights_apart
 
 _TURNED = np.diag([1.0, 1.0, -1.0, -1.0, 1.0])  # from slopes towards the scene to slopes of the light
 _FROM_ZERO = Affine.translation(1, 1, 1, 1)  # from indices counted from 0 to MATLAB's
@@ -64,7 +62,9 @@ def read(path: Path) -> Decoded:
         ours = _text(file, f"{_OURS}/Transfer", path)
         sample: Sample = "point" if _text(file, f"{_OURS}/Sample", path) == "point" else "mean"
         weighted = _numbers(file, f"{_OURS}/HasWeight", path)
-        disparities = _disparities(_numbers(file, f"{_OURS}/DisparityRange", path), path)
+        disparities = stated_range(
+            _numbers(file, f"{_OURS}/DisparityRange", path), f"{path}: {_OURS}.DisparityRange"
+        )
         about = hdf5_reading.found(file, "LFMetadata", path)
         metadata = {"LFMetadata": sorted(about)} if isinstance(about, hdf5.library().Group) else {}
     values = np.ascontiguousarray(stored.T)
@@ -128,7 +128,8 @@ def intrinsics_of(frame: Affine) -> NDArray[np.float64]:
 def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[Any] | None = None) -> Path:
     """Write a light field in the toolbox's format, with its frame as RectOptions.RectCamIntrinsicsH.
 
-    Samples keep their type and are linear. MATLAB reads the file with ``load``.
+    Samples keep their type and are linear. MATLAB reads the file with ``load``. The compressed file is made in
+    memory, next to the samples, and then written.
 
     Args:
         light_field: the light field.
@@ -155,22 +156,23 @@ def save(light_field: Samples, path: str | PathLike[str], *, weights: NDArray[An
         scaled = np.rint(weights * whole) if values.dtype.kind == "u" else weights
         values = np.concatenate([colours, scaled[..., None].astype(values.dtype)], axis=4)
 
-    def fill(file: Any, put: Put) -> None:
-        _variable(put, file, "LF", values.T, compression="gzip", compression_opts=1, shuffle=True)
+    def fill(file: Any) -> None:
+        _variable(file, "LF", values.T, compression="gzip", compression_opts=1, shuffle=True)
         options = _struct(file, "RectOptions")
-        _variable(put, options, "RectCamIntrinsicsH", intrinsics_of(grid.frame).T)
+        _variable(options, "RectCamIntrinsicsH", intrinsics_of(grid.frame).T)
         ours = _struct(file, _OURS)
         for name, word in (("Transfer", "linear"), ("Sample", grid.sample)):
-            _variable(put, ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
-        _variable(put, ours, "HasWeight", np.array([[float(weights is not None)]]))
+            _variable(ours, name, np.frombuffer(word.encode("utf-16-le"), np.uint16)[:, None], "char")
+        _variable(ours, "HasWeight", np.array([[float(weights is not None)]]))
         if grid.disparity_range is not None:
-            _variable(put, ours, "DisparityRange", np.array(grid.disparity_range, float)[:, None])
+            _variable(ours, "DisparityRange", np.array(grid.disparity_range, float)[:, None])
 
-    with atomic_path(path) as temporary:
-        write_file(temporary, fill, userblock_size=512)
-        with temporary.open("r+b") as raw:
-            # Text, no subsystem, version 2.0 and byte order: MATLAB checks this header before it calls HDF5.
-            raw.write(_HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM")
+    content = hdf5.made_in_memory(fill, userblock_size=512)
+    # Text, no subsystem, version 2.0 and byte order: MATLAB checks this header before it calls HDF5.
+    header = _HEADER.encode().ljust(116) + bytes(8) + b"\x00\x02IM"
+    with atomic_path(path) as temporary, temporary.open("wb") as raw:
+        raw.write(header.ljust(512, b"\0"))
+        raw.write(content)
     return path
 
 
@@ -180,9 +182,11 @@ def _struct(file: Any, name: str) -> Any:
     return group
 
 
-def _variable(put: Put, group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
+def _variable(group: Any, name: str, values: NDArray[Any], kind: str | None = None, **how: Any) -> None:
     """Write a variable as MATLAB stores it: reversed axes, class as an attribute."""
-    made = put(group, name, values, **how)
+    made = group.create_dataset(name, values.shape, values.dtype, **how)
+    for place in [...] if made.chunks is None else made.iter_chunks():  # interrupts end the work in between
+        made[place] = values[place]
     made.attrs["MATLAB_class"] = np.bytes_(kind or _CLASSES[values.dtype.name])
     if kind == "char":
         made.attrs["MATLAB_int_decode"] = np.int32(2)
@@ -192,16 +196,6 @@ def _numbers(file: Any, name: str, path: Path) -> NDArray[Any] | None:
     """The numbers of a variable; None if there is none."""
     data = hdf5_reading.dataset(file, name, path)
     return None if data is None else hdf5_reading.numbers(data, path)
-
-
-def _disparities(stated: NDArray[Any] | None, path: Path) -> tuple[float, float] | None:
-    """The lowest and highest disparity in a variable; None if there is none."""
-    if stated is None:
-        return None
-    given = [float(value) for value in stated.ravel()[:3]]
-    if len(given) != 2 or not -math.inf < given[0] <= given[1] < math.inf:
-        raise InputError(f"{path}: {_OURS}.DisparityRange is {given}, not two numbers, lowest first")
-    return given[0], given[1]
 
 
 def _text(file: Any, name: str, path: Path) -> str:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
+from vcc.files.pictures import averaged
 
 Order = Literal["row-major", "column-major", "serpentine", "serpentine-columns", "chess"]
 """Order of counting: row by row from the left; column by column from the top; every other row, or column,
@@ -137,11 +138,7 @@ def thumbnail(picture: NDArray[Any]) -> NDArray[np.float32]:
         picture: shape (t, s) or (t, s, channel).
     """
     grey = picture.mean(axis=2, dtype=np.float32) if picture.ndim == 3 else picture.astype(np.float32)
-    size = max(1, min(grey.shape) // _THUMBNAIL)
-    rows, columns = (n // size for n in grey.shape)
-    blocks = grey[: rows * size, : columns * size].reshape(rows, size, columns, size)
-    small: NDArray[np.float32] = blocks.mean(axis=(1, 3))
-    return small
+    return averaged(grey, max(1, min(grey.shape) // _THUMBNAIL))
 
 
 def _differences(thumbnails: Sequence[NDArray[np.float32]]) -> NDArray[np.float64]:

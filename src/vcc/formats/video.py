@@ -336,36 +336,27 @@ def encode(
     """
     av = library()
     try:
-        _encode(av, path, pictures, frames_per_second, quality, lossless)
+        with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
+            stream: Any = None
+            for picture in pictures:
+                if stream is None:
+                    codec, options = (
+                        ("libx264rgb", {"qp": "0"}) if lossless else ("libx264", {"crf": str(quality)})
+                    )
+                    rate = Fraction(frames_per_second).limit_denominator(1001)
+                    stream = container.add_stream(codec, rate=rate, options=options)
+                    stream.height, stream.width = picture.shape[:2]
+                    stream.pix_fmt = "rgb24" if lossless else "yuv420p"
+                    context = stream.codec_context
+                    context.color_primaries, context.color_trc = _BT709, _SRGB_CURVE
+                    if not lossless:
+                        context.colorspace = context.color_range = _BT709
+                frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
+                if not lossless:
+                    frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode(None))
     except (av.error.FFmpegError, av.codec.codec.UnknownCodecError) as error:
         if isinstance(error, OSError) and error.errno:
             raise
         raise InputError(f"{words} could not be written as a video: {error}") from error
-
-
-def _encode(
-    av: Any,
-    path: Path,
-    pictures: Iterator[NDArray[np.uint8]],
-    frames_per_second: float,
-    quality: int,
-    lossless: bool,
-) -> None:
-    with av.open(str(path), "w", options={"movflags": "+faststart"}) as container:
-        stream: Any = None
-        for picture in pictures:
-            if stream is None:
-                codec, options = ("libx264rgb", {"qp": "0"}) if lossless else ("libx264", {"crf": str(quality)})
-                rate = Fraction(frames_per_second).limit_denominator(1001)
-                stream = container.add_stream(codec, rate=rate, options=options)
-                stream.height, stream.width = picture.shape[:2]
-                stream.pix_fmt = "rgb24" if lossless else "yuv420p"
-                context = stream.codec_context
-                context.color_primaries, context.color_trc = _BT709, _SRGB_CURVE
-                if not lossless:
-                    context.colorspace = context.color_range = _BT709
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            if not lossless:
-                frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode(None))

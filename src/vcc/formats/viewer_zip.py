@@ -21,7 +21,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import Any, Protocol
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -89,20 +89,6 @@ def read(path: Path, *, progress: Progress | None = None) -> Decoded:
     )
 
 
-class _Store(Protocol):
-    """Access to list and pictures."""
-
-    path: Path
-
-    def names(self) -> list[str]: ...
-
-    def list_text(self) -> tuple[str, bytes]:
-        """The name and the bytes of the list."""
-        ...
-
-    def picture(self, name: str) -> NDArray[Any]: ...
-
-
 class _Folder:
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -165,6 +151,10 @@ class _Zip:
                 f"{self.path}: {member} is damaged or cannot be unpacked ({error}). Copy it again from where it "
                 "came from"
             ) from None
+
+
+_Store = _Folder | _Zip
+"""Access to the list (its name and its bytes) and to the pictures."""
 
 
 @contextmanager

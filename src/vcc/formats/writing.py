@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
-import os
-import shutil
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -20,9 +17,9 @@ from vcc.base.errors import InputError, ResultWarning
 from vcc.base.progress import Progress, tell
 from vcc.fields.grid import Grid
 from vcc.fields.samples import Samples, check_is_light_field
-from vcc.files.atomic import refusal
+from vcc.files.atomic import atomic_folder
 from vcc.files.image_metadata import ImageMetadata
-from vcc.files.parts import check_name, clear_leftovers, part_of
+from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.pictures import Exposure, save_picture, write_codes
 from vcc.formats import arrays, eslf, lftoolbox, video
 from vcc.formats.cameras import Cameras, cameras_of
@@ -32,25 +29,6 @@ from vcc.store import save_store
 
 Kind = Literal["zarr", "hci", "views", "mat", "eslf", "mosaic", "mp4", "npz"]
 """Formats in which a light field can be written; see `save_light_field`."""
-_ENDINGS: dict[Kind, str] = {
-    "zarr": ".zarr",
-    "mat": ".mat",
-    "eslf": ".png",
-    "mosaic": ".png",
-    "mp4": ".mp4",
-    "npz": ".npz",
-    "hci": "",
-    "views": "",
-}
-"""Extension of each kind; an extension without a kind selects the first kind that has it."""
-_FOLDERS = ("hci", "views", "zarr")
-_HOW: dict[Kind, str] = {
-    "zarr": "Zarr store",
-    "npz": "NumPy arrays with the frame, lossless",
-    "mat": "Light Field Toolbox .mat with its intrinsics, lossless",
-    "eslf": "one picture of tiled blocks of views (ESLF), sRGB; it holds no geometry",
-    "mosaic": "one picture of all views side by side, sRGB; it holds no geometry",
-}
 _PNG_LEVEL = 4  # a third of the default level's time, for 5 % more bytes
 DARK = 0.05
 """Fraction of white: views with darker maxima lose detail in 8 bits and look black."""
@@ -124,12 +102,9 @@ def save_light_field(
     check_is_light_field(light_field)
     path = Path(path).expanduser()
     chosen = kind_of(path, kind)
-    writer = _WRITERS[chosen]
-    taken = set(inspect.signature(writer).parameters) - {"light_field", "path", "kind", "progress"}
-    for option in options:
-        if option not in taken:
-            takes = f"takes {', '.join(sorted(taken))}" if taken else "takes no options"
-            raise InputError(f'{path}: {option}= is not supported by the format "{chosen}", which {takes}')
+    _, writer, words = _FORMATS[chosen]
+    with checks.within(str(path)):
+        checks.options_of(writer, options, ("light_field", "path", "kind", "progress"), f'the format "{chosen}"')
     if chosen in ("hci", "views"):
         saved: SavedLightField = writer(light_field, path, kind=chosen, progress=progress, **options)
         _warn_of_filling(light_field.grid, path, chosen)
@@ -144,7 +119,7 @@ def save_light_field(
         saved = SavedLightField(path, chosen, exposure, clipped, _words(light_field.grid, path, said))
     else:
         writer(light_field, path, **options)
-        saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, _HOW[chosen]))
+        saved = SavedLightField(path, chosen, 1.0, 0.0, _words(light_field.grid, path, words))
     _warn_of_filling(light_field.grid, path, chosen)
     if light_field.grid.sample != "mean" and chosen in ("eslf", "mosaic", "mp4"):
         warnings.warn(f"{path}: {_POINTS_UNSAID}", ResultWarning, stacklevel=2)
@@ -232,30 +207,32 @@ def kind_of(path: Path, kind: Kind | None) -> Kind:
     """
     ending = path.suffix.lower()
     if kind is None:
-        chosen = next((each for each, has in _ENDINGS.items() if has == ending), None)
+        chosen = next((each for each, (has, *_) in _FORMATS.items() if has == ending), None)
         if chosen is None:
-            known = ", ".join(dict.fromkeys(each for each in _ENDINGS.values() if each))
+            known = ", ".join(dict.fromkeys(each for each, *_ in _FORMATS.values() if each))
             raise InputError(
                 f'a light field cannot be written as "{path.name}": end the name in {known}, or in nothing for a '
                 'folder (kind="hci" or "views" for a folder with a dot in its name)'
             )
         return chosen
     checks.one_of("kind", kind, get_args(Kind))
-    if kind not in _FOLDERS and ending != _ENDINGS[kind]:
-        raise InputError(f'kind="{kind}" does not match the name "{path.name}": end it in {_ENDINGS[kind]}')
+    if kind not in ("hci", "views", "zarr") and ending != _FORMATS[kind][0]:
+        raise InputError(f'kind="{kind}" does not match the name "{path.name}": end it in {_FORMATS[kind][0]}')
     return kind
 
 
-_WRITERS: dict[Kind, Callable[..., Any]] = {
-    "zarr": save_store,
-    "hci": save_folder,
-    "views": save_folder,
-    "mat": lftoolbox.save,
-    "eslf": eslf.save,
-    "mosaic": eslf.save,
-    "mp4": video.save,
-    "npz": arrays.save,
+_FORMATS: dict[Kind, tuple[str, Callable[..., Any], str]] = {
+    "zarr": (".zarr", save_store, "Zarr store"),
+    "mat": (".mat", lftoolbox.save, "Light Field Toolbox .mat with its intrinsics, lossless"),
+    "eslf": (".png", eslf.save, "one picture of tiled blocks of views (ESLF), sRGB; it holds no geometry"),
+    "mosaic": (".png", eslf.save, "one picture of all views side by side, sRGB; it holds no geometry"),
+    "mp4": (".mp4", video.save, ""),
+    "npz": (".npz", arrays.save, "NumPy arrays with the frame, lossless"),
+    "hci": ("", save_folder, ""),
+    "views": ("", save_folder, ""),
 }
+"""Extension of each kind, its writer, and what is written as text, if the writer does not report it. An extension
+without a kind selects the first kind that has it."""
 
 
 def _words(grid: Grid, path: Path, more: str) -> str:
@@ -324,22 +301,10 @@ def _new_folder(path: Path) -> Iterator[Path]:
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         what = "holds files already" if path.is_dir() else "is a file"
         raise InputError(f"{path} {what}: give the name of a new folder, or move it away")
-    if not path.parent.is_dir():
-        raise InputError(f"{path.name} cannot be written: there is no folder {path.parent}. Make it first")
-    temporary = part_of(path)
-    try:
+    with atomic_folder(path) as temporary:
         clear_leftovers(path)
         temporary.mkdir()
         yield temporary
-        if path.exists():
-            path.rmdir()
-        os.replace(temporary, path)  # noqa: PTH105  (Path.replace of a folder is the same)
-    except OSError as error:
-        raise InputError(
-            f"{path} could not be written: {refusal(error, temporary)}. Nothing of it is kept"
-        ) from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 # --- cameras ---

@@ -18,7 +18,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from functools import partial, reduce
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol
+from typing import Any
 
 from vcc.base.errors import InputError, warn_of_result
 from vcc.base.memory import MEMORY_LIMIT
@@ -58,51 +58,6 @@ class Work:
     function: Function
     shared: Any
     first: Function | None = None
-
-
-class WorkerPool(Protocol):
-    """Runs the work. The caller keeps its executor: it is never shut down here."""
-
-    @property
-    def places(self) -> int:
-        """How many tasks run at once, if known."""
-        ...
-
-    @property
-    def memory(self) -> float | None:
-        """Memory in bytes for each task; None if unknown."""
-        ...
-
-    def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """The function's result for each item.
-
-        Args:
-            work: the work.
-            items: picklable.
-
-        Yields:
-            (index of the item, result), as they arrive. Closing the generator early, by an error or Ctrl-C,
-            cancels the tasks that have not started.
-
-        Raises:
-            InputError: the executor is shut down, or fails before the work is done. Errors of tasks are
-                raised again.
-        """
-        ...
-
-    def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """The sum of the function's results for all items, in the order of `Tree`.
-
-        Args:
-            work: the work.
-            items: picklable; at least one.
-            add: module-level; adds two results.
-            told: called with the index of each item that is done.
-
-        Raises:
-            InputError: as in `each`.
-        """
-        ...
 
 
 def worker_pool(executor: Any) -> WorkerPool:
@@ -296,7 +251,20 @@ class Pool:
         return int(getattr(self._executor, "_max_workers", 1))
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """See `WorkerPool.each`."""
+        """The function's result for each item.
+
+        Args:
+            work: the work.
+            items: picklable.
+
+        Yields:
+            (index of the item, result), as they arrive. Closing the generator early, by an error or Ctrl-C,
+            cancels the tasks that have not started.
+
+        Raises:
+            InputError: the executor is shut down, or fails before the work is done. Errors of tasks are
+                raised again.
+        """
         parcel, futures = Parcel.of((work.function, work.shared)), []
         if work.first is not None:
             perform(None, Parcel.of((work.first, work.shared)))
@@ -312,7 +280,17 @@ class Pool:
                     future.cancel()
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `WorkerPool.summed`; results are added in this process."""
+        """The sum of the function's results for all items, in the order of `Tree`.
+
+        Args:
+            work: the work.
+            items: picklable; at least one.
+            add: module-level; adds two results.
+            told: called with the index of each item that is done.
+
+        Raises:
+            InputError: as in `each`.
+        """
         tree = Tree(len(items), add)
         with closing(self.each(work, items)) as results:
             for number, result in results:
@@ -386,7 +364,7 @@ class Cluster:
         return min(rooms, default=None)
 
     def each(self, work: Work, items: Sequence[Any]) -> Generator[tuple[int, Any], None, None]:
-        """See `WorkerPool.each`."""
+        """See `Pool.each`."""
         futures = self._mapped(work, items)
         try:
             for number in _finished(futures, self._look):
@@ -397,7 +375,7 @@ class Cluster:
             self._cancel(futures)
 
     def summed(self, work: Work, items: Sequence[Any], add: Add, told: Callable[[int], None]) -> Any:
-        """See `WorkerPool.summed`; the workers add the results, and only the sum is transferred."""
+        """See `Pool.summed`; the workers add the results, and only the sum is transferred."""
         futures = self._mapped(work, items)
         total = self._tree(futures, add)
         try:
@@ -526,3 +504,7 @@ class Cluster:
         waiting = [future for future in futures if future is not None and not future.done()]
         if waiting and self._client.status == "running" and not self._silent:
             self._client.cancel(waiting)
+
+
+WorkerPool = Pool | Cluster
+"""What runs the work. The caller keeps its executor: it is never shut down here."""

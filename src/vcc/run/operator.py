@@ -10,7 +10,7 @@ import abc
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,22 +31,8 @@ from vcc.run.bands import BandPlans, Mixing, SomeChannels, read_once
 from vcc.run.drive import Drive
 from vcc.run.required_samples import required_samples
 
-
-class Slots(Protocol):
-    """An array that accepts samples piece by piece: of NumPy, in memory or mapped from disk, or of Zarr."""
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Of all samples."""
-        ...
-
-    def __getitem__(self, index: Any, /) -> Any:
-        """A piece, as an array of NumPy."""
-        ...
-
-    def __setitem__(self, index: Any, values: Any, /) -> None:
-        """Store a piece."""
-        ...
+Slots = Any
+"""An array that accepts samples piece by piece: of NumPy, in memory or mapped from disk, or of Zarr."""
 
 
 class LinearMap(abc.ABC):

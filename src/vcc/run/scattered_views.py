@@ -93,20 +93,16 @@ class ScatteredViews:
             away = np.minimum(away, np.linalg.norm(self.places - self.places[chosen[-1]], axis=1))
         return tuple(chosen)
 
-    def find_disparities(
-        self, disparity_range: tuple[float, float] | None = None, progress: Progress | None = None
-    ) -> DisparityMaps:
+    def find_disparities(self, progress: Progress | None = None) -> DisparityMaps:
         """The disparities of the views of `swept`, pixels per view of the grid along u.
 
         Args:
-            disparity_range: (lowest, highest) to be tested; None uses that of the grid, or a first sweep of
-                coarser views.
             progress: called with (done, total).
 
         Raises:
             InputError: more memory needed than allowed, or views without texture.
         """
-        low, high = disparity_range or self.grid.disparity_range or self._first_look()
+        low, high = self.grid.disparity_range or self._first_look()
         step = max(FINEST_STEP, (high - low) / MOST_STEPS)
         tried = np.linspace(low, high, max(3, math.ceil((high - low) / step) + 1))
         found = []

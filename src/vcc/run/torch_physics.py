@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcc.base import checks
 from vcc.base.errors import InputError
@@ -24,17 +23,8 @@ with checks.package("op.as_deepinv", "deepinv", "deepinv"):
         ) from error
 
 
-class LinearMap(Protocol):
-    """A map of one or several arrays that has an adjoint."""
-
-    @property
-    def T(self) -> LinearMap:
-        """The adjoint."""
-        ...
-
-    def __call__(self, numbers: NDArray[Any], /) -> NDArray[Any]:
-        """Apply the map."""
-        ...
+LinearMap = Any
+"""A function of one or several arrays with an adjoint, ``T``: `vcc.run.operator.LinearMap`, which loads this."""
 
 
 def linear_physics(

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable
-from concurrent.futures import as_completed
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from vcc.base import checks, lazy_import
+from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
 from vcc.base.units import short
@@ -219,7 +219,7 @@ class PlanesScene:
 
     def __init__(self, planes: Iterable[TexturedPlane]) -> None:
         self.planes = tuple(sorted(planes, key=lambda plane: plane.distance))
-        self._kept: tuple[_GridAround, NDArray[np.float32]] | None = None
+        self._kept: _Rasters | None = None
         if not self.planes:
             raise InputError("a scene needs at least one plane")
 
@@ -273,10 +273,25 @@ class PlanesScene:
         Returns:
             Linear radiance, (rows, columns, 3), row 0 at the top.
         """
+        slope = self._slope_of(camera)
+        if slope is None:
+            return self._integrated(camera)
+        if self._kept is None or not self._kept.serve(camera, slope):
+            self._kept = _Rasters.around(camera, slope, self.planes, cores())
+        picture = np.empty((*camera.pixels, 3), np.float32)
+        self._kept.draw(camera, picture)
+        return picture
+
+    def _slope_of(self, camera: ViewCamera) -> float | None:
+        """Slope per pixel of a view that rasters can serve: square pixels, and planes that face the camera."""
         rows, columns = camera.pixels
         across, down = (camera.right - camera.left) / columns, (camera.bottom - camera.top) / rows
-        if math.isclose(across, down, rel_tol=1e-9) and not any(plane.tilted for plane in self.planes):
-            return self._from_rasters(camera, across)
+        facing = math.isclose(across, down, rel_tol=1e-9) and not any(plane.tilted for plane in self.planes)
+        return across if facing else None
+
+    def _integrated(self, camera: ViewCamera) -> NDArray[np.float32]:
+        """A view whose samples are means over 4×4 points of their pixels."""
+        rows, columns = camera.pixels
         fine = RASTER_PER_PIXEL
         step = ((camera.right - camera.left) / columns / fine, (camera.bottom - camera.top) / rows / fine)
         # A ray from direction a has slope −a.
@@ -289,26 +304,6 @@ class PlanesScene:
             values = self._along(np.asarray(camera.x), np.asarray(camera.y), s, t, step)
             picture[start:stop] = values.reshape(stop - start, fine, columns, fine, 3).mean(axis=(1, 3))
         return picture
-
-    def _from_rasters(self, camera: ViewCamera, slope: float) -> NDArray[np.float32]:
-        # Displacement of each plane in this view in pixels, negated: rows, columns
-        middle = ((camera.top + camera.bottom) / 2, (camera.left + camera.right) / 2)
-        place = (camera.y, camera.x)
-        shifts = np.array([[(place[n] / z + middle[n]) / slope for n in (0, 1)] for z in self.distances])
-        margins = (math.ceil(np.abs(shifts[:, 0]).max()) + 1, math.ceil(np.abs(shifts[:, 1]).max()) + 1)
-        kept = self._kept
-        # Equal margins on both sides: the first view of an array is a corner, and its rasters then serve all
-        # other views.
-        if kept is None or not kept[0].holds(camera.pixels, slope, margins):
-            grid = _GridAround((1, 1), camera.pixels, 1.0, slope, math.inf, margins)
-            with Workers(cores()) as pool:
-                kept = self._kept = (grid, _rasters(self.planes, grid, pool))
-        grid, rasters = kept
-        down, across = (_starts_at(shifts[:, n : n + 1], grid.margins[n]) for n in (0, 1))
-        picture = np.empty((1, *camera.pixels, 3), np.float32)
-        one, endless = np.float32(1), np.float32(np.inf)
-        lazy_import.module("vcc.sources.kernels").views_of_row(rasters, down, across, 0, one, endless, picture)
-        return np.asarray(picture[0])
 
     def description(self) -> dict[str, Any]:
         """Everything that the images depend on except the cameras, as JSON data.
@@ -360,74 +355,102 @@ class PlanesScene:
             raise InputError(f"a light field is made as uint8, uint16 or float32, not {kind}")
         if min(*views, *pixels) < 1:
             raise InputError(f"a light field needs at least one view and pixel, not {views} and {pixels}")
-        # A single sample lets LightField check the geometry before any work is done.
-        values = np.empty((*views, *pixels, 3), dtype=kind)
-        LightField.from_views(np.zeros((1, 1, 1, 1, 3), kind), spacing, slope_per_pixel, focus_distance)
-        if any(plane.tilted for plane in self.planes):
-            cameras = CameraArray(views, pixels, spacing, slope_per_pixel, focus_distance)
-            _fill_view_by_view(self, values, cameras, threads, progress)
-            return cameras.light_field(values)
-        disparities = [spacing * (1 / z - 1 / focus_distance) / slope_per_pixel for z in self.distances]
+        cameras = CameraArray(views, pixels, spacing, slope_per_pixel, focus_distance)
+        values = np.empty((*cameras.shape, 3), dtype=kind)
+        # The first view is a corner: its rasters serve all others.
+        corner, known = cameras.camera(0, 0), None
+        slope = self._slope_of(corner)
+        rasters = None if slope is None else _Rasters.around(corner, slope, self.planes, threads or cores())
+        if rasters is not None:
+            disparities = [cameras.disparity(z) for z in self.distances]
+            known = (min(disparities), max(disparities))
+        top = float(np.iinfo(kind).max) if kind.kind == "u" else 1.0
+
+        def view(row: int, column: int) -> None:
+            camera = cameras.camera(row, column)
+            if rasters is not None:
+                rasters.draw(camera, values[row, column])
+            else:
+                picture = self._integrated(camera)
+                values[row, column] = np.rint(np.clip(picture, 0, 1) * top) if kind.kind == "u" else picture
+
         with Workers(threads or cores()) as pool:
-            grid = _Grid(views, pixels, spacing, slope_per_pixel, focus_distance)
-            rasters = _rasters(self.planes, grid, pool)
-            _fill(values, self.planes, grid, rasters, pool, progress)
-        return LightField.from_views(
-            values, spacing, slope_per_pixel, focus_distance, (min(disparities), max(disparities))
-        )
+            for row in range(views[0]):
+                for task in [pool.submit(view, row, column) for column in range(views[1])]:
+                    task.result()
+                tell(progress, row + 1, views[0])
+        return cameras.light_field(values, known)
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """The geometry of an array of views, in pixels of a plane at some distance."""
+@dataclass(frozen=True, eq=False, repr=False)
+class _Rasters(Brief):
+    """Each plane's texture averaged over a pixel, with a margin, for views of one size and slope per pixel.
 
-    views: tuple[int, int]
+    Args:
+        values: at 4 points per pixel, (planes, rows, 4 phases, 4, columns).
+        distances: of the planes, metres.
+        pixels: (rows, columns) of a view.
+        slope: per pixel.
+        margins: pixels beyond a view on the axis, (rows, columns), equal on both sides.
+    """
+
+    values: NDArray[np.float32]
+    distances: tuple[float, ...]
     pixels: tuple[int, int]
-    spacing: float
-    slope_per_pixel: float
-    focus_distance: float
+    slope: float
+    margins: tuple[int, ...]
 
-    def shifts(self, distance: float, axis: int) -> Array:
-        """Displacements of the views along an axis (0: rows) in pixels, relative to the central view, negated."""
-        place = (np.arange(self.views[axis]) - (self.views[axis] - 1) / 2) * self.spacing
-        # A pixel sees x = u − Z·s = u·(1 − Z/F) + Z·ps·(k − k₀), which is Z·ps metres per pixel.
-        return np.asarray(place * (1 / distance - 1 / self.focus_distance) / self.slope_per_pixel)
+    @classmethod
+    def around(cls, camera: ViewCamera, slope: float, planes: Sequence[TexturedPlane], threads: int) -> _Rasters:
+        """Rasters for a view, and for all nearer to the axis."""
+        distances = tuple(plane.distance for plane in planes)
+        margins = _margins(_shifts(camera, distances, slope))
+        sizes = tuple(size + 2 * margin for size, margin in zip(camera.pixels, margins, strict=True))
+        with Workers(threads) as pool:
+            return cls(_rasters(planes, sizes, slope, pool), distances, camera.pixels, slope, margins)
 
-    def pixel(self, distance: float) -> float:
-        """The size of a pixel on a plane, metres."""
-        return distance * self.slope_per_pixel
+    def serve(self, camera: ViewCamera, slope: float) -> bool:
+        """Whether a view fits into the rasters."""
+        same = self.pixels == tuple(camera.pixels) and math.isclose(self.slope, slope, rel_tol=1e-12)
+        needed = _margins(_shifts(camera, self.distances, slope))
+        return same and all(mine >= other for mine, other in zip(self.margins, needed, strict=True))
 
-    def margin(self, distances: tuple[float, ...], axis: int) -> int:
-        """Pixels by which a raster extends beyond the central view, for all planes."""
-        return math.ceil(max(float(np.abs(self.shifts(z, axis)).max()) for z in distances)) + 1
-
-
-@dataclass(frozen=True)
-class _GridAround(_Grid):
-    """The geometry of views anywhere, with a fixed number of pixels and fixed margins."""
-
-    margins: tuple[int, int] = (0, 0)
-
-    def margin(self, distances: tuple[float, ...], axis: int) -> int:
-        return self.margins[axis]
-
-    def holds(self, pixels: tuple[int, int], slope: float, margins: tuple[int, int]) -> bool:
-        """Whether views with these parameters fit into the rasters of this grid."""
-        same = self.pixels == tuple(pixels) and math.isclose(self.slope_per_pixel, slope, rel_tol=1e-12)
-        return same and all(mine >= other for mine, other in zip(self.margins, margins, strict=True))
+    def draw(self, camera: ViewCamera, out: NDArray[Any]) -> None:
+        """Draw a view, (rows, columns, 3): radiance, or integers of which the largest is radiance 1."""
+        # The centre of pixel 0 is (fine − 1)/2 points after the first point of its pixel.
+        shifts = _shifts(camera, self.distances, self.slope) + np.array(self.margins)
+        place = shifts * RASTER_PER_PIXEL + (RASTER_PER_PIXEL - 1) / 2
+        first = np.floor(place).astype(np.int64)
+        share = (place - first).astype(np.float32)
+        full = np.float32(np.iinfo(out.dtype).max if out.dtype.kind == "u" else 1.0)
+        top = full if out.dtype.kind == "u" else np.float32(np.inf)
+        lazy_import.module("vcc.sources.kernels").draw_view(self.values, first, share, full, top, out)
 
 
-def _rasters(planes: tuple[TexturedPlane, ...], grid: _Grid, pool: Workers) -> NDArray[np.float32]:
+def _shifts(camera: ViewCamera, distances: Sequence[float], slope: float) -> Array:
+    """Displacement of planes in a view, negated, pixels along (rows, columns): (planes, 2)."""
+    middle = ((camera.top + camera.bottom) / 2, (camera.left + camera.right) / 2)
+    place = np.array([camera.y, camera.x])
+    return np.array([(place / z + middle) / slope for z in distances])
+
+
+def _margins(shifts: Array) -> tuple[int, ...]:
+    """Pixels along (rows, columns) by which rasters extend beyond a view on the axis."""
+    return tuple(int(n) + 1 for n in np.ceil(np.abs(shifts).max(axis=0)))
+
+
+def _rasters(
+    planes: Sequence[TexturedPlane], sizes: tuple[int, ...], slope: float, pool: Workers
+) -> NDArray[np.float32]:
     """Each plane's texture averaged over a pixel, at 4 points per pixel: (planes, rows, 4 phases, 4, columns)."""
     fine = RASTER_PER_PIXEL
-    distances = tuple(plane.distance for plane in planes)
-    rows, columns = (grid.pixels[axis] + 2 * grid.margin(distances, axis) for axis in (0, 1))
+    rows, columns = sizes
     rasters = np.empty((len(planes), rows * fine, fine, 4, columns), dtype=np.float32)
 
     def block(number: int, start: int) -> None:
         plane = planes[number]
         stop = min(start + _ROWS_PER_BLOCK, rows * fine)
-        step = grid.pixel(plane.distance) / fine
+        step = plane.distance * slope / fine
         # Point m of the raster is the mean over points m … m + fine − 1, with centre m + (fine − 1)/2.
         x = (np.arange(columns * fine + fine - 1) - (columns * fine - 1) / 2 - (fine - 1) / 2) * step
         y = (np.arange(start, stop + fine - 1) - (rows * fine - 1) / 2 - (fine - 1) / 2) * step
@@ -450,60 +473,3 @@ def _running_mean(values: Array, axis: int, count: int) -> Any:
         total += moved[shift : shift + length]
     total /= count
     return np.moveaxis(total, 0, axis)
-
-
-def _fill(
-    values: Array,
-    planes: tuple[TexturedPlane, ...],
-    grid: _Grid,
-    rasters: NDArray[np.float32],
-    pool: Workers,
-    progress: Progress | None,
-) -> None:
-    down, across = (_starts(planes, grid, axis) for axis in (0, 1))
-    whole = values.dtype.kind == "u"
-    scale = np.float32(np.iinfo(values.dtype).max if whole else 1.0)
-    top = scale if whole else np.float32(np.inf)
-
-    def views(j: int) -> None:
-        lazy_import.module("vcc.sources.kernels").views_of_row(rasters, down, across, j, scale, top, values[j])
-
-    tasks = [pool.submit(views, j) for j in range(grid.views[0])]
-    for done, task in enumerate(as_completed(tasks), 1):
-        task.result()
-        tell(progress, done, grid.views[0])
-
-
-def _fill_view_by_view(
-    scene: PlanesScene,
-    values: Array,
-    cameras: CameraArray,
-    threads: int | None,
-    progress: Progress | None,
-) -> None:
-    whole = values.dtype.kind == "u"
-    top = float(np.iinfo(values.dtype).max) if whole else 1.0
-
-    def view(row: int, column: int) -> None:
-        picture = scene.render(cameras.camera(row, column))
-        values[row, column] = np.rint(np.clip(picture, 0, 1) * top) if whole else picture
-
-    rows, columns = cameras.views
-    with Workers(threads or cores()) as pool:
-        for row in range(rows):
-            for task in [pool.submit(view, row, column) for column in range(columns)]:
-                task.result()
-            tell(progress, row + 1, rows)
-
-
-def _starts(planes: tuple[TexturedPlane, ...], grid: _Grid, axis: int) -> tuple[Array, NDArray[np.float32]]:
-    """Position of pixel 0 of each view in each raster: point (planes, views) and weight of the next point."""
-    distances = tuple(plane.distance for plane in planes)
-    return _starts_at(np.stack([grid.shifts(z, axis) for z in distances]), grid.margin(distances, axis))
-
-
-def _starts_at(shifts: Array, margin: int) -> tuple[Array, NDArray[np.float32]]:
-    # The centre of pixel 0 is (fine − 1)/2 points after the first point of its pixel.
-    place = (margin + shifts) * RASTER_PER_PIXEL + (RASTER_PER_PIXEL - 1) / 2
-    first = np.floor(place).astype(np.int64)
-    return first, (place - first).astype(np.float32)

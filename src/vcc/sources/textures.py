@@ -345,22 +345,19 @@ class Painting:
         piece[..., 3:] += opacity
         self.values[where] = piece
 
-    def rectangle(
-        self, bounds: tuple[float, float, float, float], colour: Colour, edge: float, opacity: float = 1.0
-    ) -> None:
+    def rectangle(self, bounds: tuple[float, float, float, float], colour: Colour, edge: float) -> None:
         """Composite a rectangle over the painting.
 
         Args:
             bounds: (left, top, right, bottom), metres.
             colour: linear radiance.
             edge: width of its soft edge, metres.
-            opacity: 0 to 1.
         """
         left, top, right, bottom = bounds
 
         def shape(x: Array, y: Array) -> tuple[Array, Colour]:
             across = soft(np.minimum(x - left, right - x), edge)
-            return opacity * across * soft(np.minimum(y - top, bottom - y), edge), colour
+            return across * soft(np.minimum(y - top, bottom - y), edge), colour
 
         self.paint((left - edge, top - edge, right + edge, bottom + edge), shape)
 

@@ -104,11 +104,7 @@ class Attributes(Brief):
                 f'{path} is a Zarr group, but not a light field: its attributes have no "{KEY}". See '
                 "docs/store.md for the format of a store"
             )
-        version = stated.get("format_version")
-        if checks.whole_number_between(f"{path}: format_version", version, 1) > FORMAT_VERSION:
-            raise InputError(
-                f"{path} has format_version {version}, and this vcc reads up to {FORMAT_VERSION}: use a newer vcc"
-            )
+        check_version(path, stated.get("format_version"), FORMAT_VERSION)
         missing = [name for name in ("frame", "transfer", "complete") if name not in stated]
         if missing:
             raise InputError(f"{path}: its attributes do not state {', '.join(missing)} (see docs/store.md)")
@@ -168,6 +164,16 @@ class Attributes(Brief):
     def finished(self, lossy: dict[str, Any] | None) -> Attributes:
         """Copy of the attributes for a complete store."""
         return replace(self, complete=True, lossy=lossy)
+
+
+def check_version(path: Path, stated: Any, newest: int) -> None:
+    """Check the version of a format that a file states.
+
+    Raises:
+        InputError: it is no version, or newer than ``newest``.
+    """
+    if checks.whole_number_between(f"{path}: format_version", stated, 1) > newest:
+        raise InputError(f"{path} has format_version {stated}, and this vcc reads up to {newest}: use a newer vcc")
 
 
 def written_here() -> dict[str, Any]:

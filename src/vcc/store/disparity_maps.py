@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from vcc.base.errors import InputError
-from vcc.base.reading import MOST_UNPACKED, check_file, shown
+from vcc.base.reading import shown
 from vcc.base.workers import uninterrupted
 from vcc.fields.disparity import DisparityMaps
 from vcc.files.parts import clear_leftovers, part_of
-from vcc.store.zarr_chunks import check_size, read_array
+from vcc.store.zarr_chunks import opened_array, read_array
 
 FOLDER = "disparity"
 """The name of the array in the group."""
@@ -33,12 +33,8 @@ def read_maps(store: Path, shape: tuple[int, ...]) -> DisparityMaps | None:
     folder = store / FOLDER
     if not folder.is_dir():
         return None
-    import zarr
-
     try:
-        check_file(folder / "zarr.json")
-        check_size(folder / "zarr.json", MOST_UNPACKED)
-        array = zarr.open_array(store=zarr.storage.LocalStore(folder, read_only=True), mode="r")
+        array = opened_array(store, FOLDER, "disparity maps")
         (rows, columns), views_of_all = shape[2:4], shape[0] * shape[1]
         if tuple(array.shape[1:]) != (rows, columns) or not 0 < array.shape[0] <= views_of_all:
             raise ValueError(f"maps of shape {tuple(array.shape)} for {views_of_all} views of {rows}×{columns}")

@@ -14,12 +14,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from vcc.base import checks
-from vcc.base.affine import Affine
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.reading import read_bytes, read_json, shown, value_at
-from vcc.fields.grid import Grid, Sample, check_shape
-from vcc.store.attributes import DTYPES, Attributes, Transfer, plain
+from vcc.fields.grid import Grid, check_shape
+from vcc.store.attributes import DTYPES, Attributes, check_version, plain
 from vcc.store.held import IDENTITY
 
 VIDEO_VERSION = 1
@@ -32,6 +31,9 @@ UNFINISHED = ".unfinished"
 Between = Literal["linear", "held"]
 """Interpolation between two frames: linear in time, or the first frame until the second."""
 
+SHARED = ("frame", "transfer", "sample", "channel_names", "wavelengths")
+"""Attributes that all frames of a video share."""
+
 _NAME = re.compile(r"([0-9]{6,})_(-?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?)")
 
 
@@ -41,41 +43,31 @@ class Common(Brief):
 
     Args:
         shape: (v, u, t, s) or (v, u, t, s, channels).
-        kind: the NumPy type of the samples as stored.
-        frame: see `vcc.LightField`.
-        transfer: transfer function of the stored samples.
-        sample: meaning of a sample, ``"mean"`` or ``"point"``.
-        channel_names: a name for each channel, or None.
-        wavelengths: in the middle of each channel's band, metres, or None.
+        kind: type of the samples as stored.
+        attributes: of a frame; those listed in `SHARED` are the same in all.
     """
 
     shape: tuple[int, ...]
     kind: np.dtype[Any]
-    frame: Affine
-    transfer: Transfer
-    sample: Sample
-    channel_names: tuple[str, ...] | None
-    wavelengths: tuple[float, ...] | None = None
+    attributes: Attributes
 
     @property
     def grid(self) -> Grid:
         """A frame without its samples, as stored."""
-        return Grid(self.shape, self.frame, self.kind, self.sample, wavelengths=self.wavelengths)
+        known = self.attributes
+        return Grid(self.shape, known.frame, self.kind, known.sample, wavelengths=known.wavelengths)
 
     def difference(self, other: Common) -> str:
         """Text for the differences from ``other``; empty if there are none."""
         told = {
             "shape": ("×".join(map(str, one.shape)) for one in (self, other)),
             "type": (one.kind.name for one in (self, other)),
-            "transfer": (one.transfer for one in (self, other)),
-            "sample": (one.sample for one in (self, other)),
-            "channel_names": (one.channel_names for one in (self, other)),
-            "wavelengths": (one.wavelengths for one in (self, other)),
+            **{name: [getattr(one.attributes, name) for one in (self, other)] for name in SHARED[1:]},
         }
         words = [f"{name} {here} instead of {there}" for name, (here, there) in told.items() if here != there]
-        if self.frame != other.frame:
+        if self.attributes.frame != other.attributes.frame:
             here, there = self.grid.geometry, other.grid.geometry
-            most = np.abs(self.frame.matrix - other.frame.matrix).max()
+            most = np.abs(self.attributes.frame.matrix - other.attributes.frame.matrix).max()
             words.append(
                 f"{here} instead of {there}" if here != there else f"a frame that differs by up to {most:.3g}"
             )
@@ -83,22 +75,16 @@ class Common(Brief):
 
     def as_json(self) -> dict[str, Any]:
         """The properties as JSON data."""
-        return {
-            "shape": list(self.shape),
-            "dtype": self.kind.name,
-            "frame": self.frame.matrix.tolist(),
-            "transfer": self.transfer,
-            "sample": self.sample,
-            "channel_names": None if self.channel_names is None else list(self.channel_names),
-            **({} if self.wavelengths is None else {"wavelengths": list(self.wavelengths)}),
-        }
+        stated = self.attributes.as_json()
+        shared = {name: stated[name] for name in SHARED if name in stated}
+        return {"shape": list(self.shape), "dtype": self.kind.name, **shared}
 
     @classmethod
     def from_json(cls, stated: Any, path: Path) -> Common:
         """Read the common properties of the frames of the video at ``path``.
 
         Raises:
-            InputError: a property is missing or invalid (named).
+            InputError: they are missing, or those of no light field.
         """
         if not isinstance(stated, dict):
             raise InputError(f"{path}: grid is an object or null, not {type(stated).__name__}")
@@ -107,24 +93,13 @@ class Common(Brief):
             raise InputError(f"{path}: its grid does not state {', '.join(missing)} (see docs/store.md)")
         checks.one_of(f"{path}: dtype", stated["dtype"], DTYPES)
         try:
-            names, wavelengths = stated.get("channel_names"), stated.get("wavelengths")
-            made = cls(
-                tuple(checks.whole_number_between("a size of shape", size, 1) for size in stated["shape"]),
-                np.dtype(stated["dtype"]),
-                Affine(np.array(stated["frame"], dtype=np.float64)),
-                stated["transfer"],
-                stated.get("sample", "mean"),
-                None if names is None else tuple(names),
-                None if wavelengths is None else tuple(wavelengths),
-            )
-            check_shape(made.shape)
-        except (TypeError, ValueError, OverflowError) as error:
+            shape = tuple(checks.whole_number_between("a size of shape", size, 1) for size in stated["shape"])
+            check_shape(shape)
+        except (TypeError, ValueError) as error:
             raise InputError(f"{path}: its grid cannot be used: {error}") from None
-        attributes = Attributes(
-            made.frame, made.transfer, made.channel_names, sample=made.sample, wavelengths=made.wavelengths
-        )
-        attributes.check(str(path), made.shape[4] if len(made.shape) == 5 else None)
-        return made
+        attributes = Attributes.from_json({**stated, "format_version": 1, "complete": True}, path)
+        attributes.check(str(path), shape[4] if len(shape) == 5 else None)
+        return cls(shape, np.dtype(stated["dtype"]), attributes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -163,12 +138,7 @@ class VideoAttributes(Brief):
         stated = video_attributes(path)
         if stated is None:
             raise InputError(f"{path} is not a video of light fields: vcc.store.open_store opens a light field")
-        version = checks.whole_number_between(f"{path}: format_version", stated.get("format_version"), 1)
-        if version > VIDEO_VERSION:
-            raise InputError(
-                f"{path} has format_version {version}, and this vcc reads videos up to {VIDEO_VERSION}: use a "
-                "newer vcc"
-            )
+        check_version(path, stated.get("format_version"), VIDEO_VERSION)
         between = stated.get("between", "linear")
         checks.one_of(f"{path}: between", between, get_args(Between))
         common, provenance = stated.get("grid"), stated.get("provenance") or {}

@@ -121,7 +121,7 @@ class StoredVideo(Sequence[StoredLightField]):
             raise InputError(
                 f"{place.words}, of {self.path} cannot be used: {said}. Copy the frame again"
             ) from error
-        difference = common_of(frame).difference(self._common)
+        difference = Common(frame.shape, frame.dtype, frame.attributes).difference(self._common)
         if difference:
             raise InputError(
                 f"{place.words}, of {self.path} has another grid than the video states: {difference}. Copy the "
@@ -145,13 +145,6 @@ def _opened_elsewhere(
 def _identity(folder: Path) -> Any:
     """The attributes that identify a video, without the grid, which is added with the first frame."""
     return attributes_of(folder, VIDEO, but=("grid",))
-
-
-def common_of(frame: StoredLightField) -> Common:
-    """The properties that a frame shares with the other frames of its video."""
-    return Common(
-        frame.shape, frame.dtype, frame.frame, frame.transfer, frame.sample, frame.channel_names, frame.wavelengths
-    )
 
 
 def open_video(path: str | PathLike[str]) -> StoredVideo:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -25,15 +24,15 @@ from vcc.base.progress import Progress
 from vcc.base.reading import expanded
 from vcc.fields.grid import Sample
 from vcc.fields.samples import Samples, check_is_light_field
-from vcc.files.atomic import atomic_path
+from vcc.files.atomic import atomic_folder, atomic_path
 from vcc.files.parts import check_name, clear_folder, clear_leftovers, part_of, settle, settle_names
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import Transfer, plain, written_here
+from vcc.store.attributes import Attributes, Transfer, plain, written_here
 from vcc.store.compression import Compression, Pixels
 from vcc.store.converting import as_kept
 from vcc.store.held import drawn
 from vcc.store.reading import restored
-from vcc.store.video_layout import UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
+from vcc.store.video_layout import SHARED, UNFINISHED, VIDEO, Between, Common, Place, VideoAttributes
 from vcc.store.video_reading import is_video, open_video
 from vcc.store.writing import Framed, StoreWriter, create_store, in_one_piece, write_all
 
@@ -90,15 +89,9 @@ class VideoWriter:
         check_is_light_field(light_field)
         kept = as_kept(light_field, self.packing.transfer, self.packing.dtype)
         grid = kept.grid
-        common = Common(
-            grid.shape,
-            grid.kind,
-            grid.frame,
-            kept.transfer,
-            grid.sample,
-            kept.channel_names or self.packing.channel_names,
-            grid.wavelengths,
-        )
+        names = kept.channel_names or self.packing.channel_names
+        shared = Attributes(grid.frame, kept.transfer, names, sample=grid.sample, wavelengths=grid.wavelengths)
+        common = Common(grid.shape, grid.kind, shared)
         stated = {
             "disparity_range": grid.disparity_range,
             "provenance": kept.provenance,
@@ -143,7 +136,8 @@ class VideoWriter:
         frame = cameras_or_frame if isinstance(cameras_or_frame, Affine) else cameras_or_frame.frame
         sizes = tuple(int(size) for size in shape)
         how = self.packing
-        common = Common(sizes, np.dtype(dtype), frame, how.transfer, sample, how.channel_names)
+        shared = Attributes(frame, how.transfer, how.channel_names, sample=sample)
+        common = Common(sizes, np.dtype(dtype), shared)
         made = None if provenance is None else dict(provenance)
         with self._frame(common, time, {"disparity_range": disparity_range, "provenance": made}) as writer:
             yield writer
@@ -168,15 +162,12 @@ class VideoWriter:
         begin = partial(
             create_store,
             part,
-            common.frame,
+            common.attributes.frame,
             common.shape,
             common.kind,
-            transfer=common.transfer,
-            channel_names=common.channel_names,
-            sample=common.sample,
-            wavelengths=common.wavelengths,
             chunks=self.packing.chunks,
             compression=self.packing.compression,
+            **{name: getattr(common.attributes, name) for name in SHARED[1:]},
             **stated,
         )
         put = partial(self._put, part, common, place)
@@ -230,11 +221,7 @@ class VideoWriter:
             )
 
     def _check_may_write(self, ending: bool = False) -> None:
-        if not self._lock.held:
-            raise InputError(
-                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
-                "that, or make one by create_video"
-            )
+        self._lock.check("create_video")
         if self._busy and not ending:
             raise InputError(
                 f"a frame of {self.path} is being written: one follows the other, end its block first"
@@ -319,18 +306,13 @@ def create_video(
 
 def _begin(folder: Path, attributes: VideoAttributes) -> None:
     """Create the group under a temporary name and rename it."""
-    if not folder.parent.is_dir():
-        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
-    part = part_of(folder)
-    try:
+    with atomic_folder(folder) as part:
         part.mkdir()
         _write_attributes(part, attributes)
-        part.replace(folder)
+    try:
         settle_names(folder.parent)
     except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+        raise InputError(f"{folder} could not be flushed to the disk: {error.strerror or error}") from error
 
 
 def _removed_if_empty(folder: Path) -> None:

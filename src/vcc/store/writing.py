@@ -28,7 +28,7 @@ from vcc.fields.filling import Filling
 from vcc.fields.grid import Grid, Sample
 from vcc.fields.samples import Samples, check_is_light_field
 from vcc.fields.view_arrays import one_view
-from vcc.files.atomic import refusal
+from vcc.files.atomic import atomic_folder, refusal
 from vcc.files.parts import check_name, clear_leftovers, part_of, put_in_place
 from vcc.files.writer_lock import WriterLock, in_turn
 from vcc.store.attributes import (
@@ -87,10 +87,6 @@ class StoreWriter:
         kind: np.dtype[Any] = np.dtype(self.array.dtype)
         return kind
 
-    def has_view(self, row: int, column: int) -> bool:
-        """Whether a view exists."""
-        return self._reader.view_file(row, column).is_file()
-
     def missing(self) -> list[tuple[int, int]]:
         """(row, column) of the views that are still missing, row by row."""
         return self._reader.missing()
@@ -114,11 +110,7 @@ class StoreWriter:
             raise InputError(f"there is no view ({row}, {column}) in a store of {nv}×{nu} views")
         if self.attributes.complete:
             raise InputError(f"{self.path} is finished: its views stay as they are")
-        if not self._lock.held:
-            raise InputError(
-                f"this writer of {self.path} has ended: its with block is over, or another was made since. Use "
-                "that, or make one by create_store"
-            )
+        self._lock.check("create_store")
         view = self._fitting(np.asarray(samples), f"view ({row}, {column}) for {self.path}")
         try:
             uninterrupted(self.array.__setitem__, (row, column), view)
@@ -477,12 +469,9 @@ def _make(
     """Create the group and its array under a temporary name and rename the folder."""
     import zarr
 
-    if not folder.parent.is_dir():
-        raise InputError(f"{folder} cannot be made: there is no folder {folder.parent}; make it first")
     cut = layout(shape, kind, packing, chunks)
-    part = part_of(folder)
 
-    def make() -> None:
+    def make(part: Path) -> None:
         store = zarr.storage.LocalStore(part)
         group = zarr.create_group(store, attributes={KEY: attributes.as_json()})
         group.create_array(
@@ -494,13 +483,8 @@ def _make(
             **cut,
         )
 
-    try:
-        uninterrupted(make)
-        part.replace(folder)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
+    with atomic_folder(folder) as part:
+        uninterrupted(make, part)
 
 
 def _writable(array: Any) -> Any:

@@ -17,6 +17,22 @@ HEADS = 2**12
 """Overhead in bytes of an incompressible chunk (headers, checksums), in addition to 1/128 of its samples."""
 
 
+def opened_array(folder: Path, name: str, what: str, mode: Any = "r") -> Any:
+    """Open the Zarr array of that name in a group; its values are not read yet.
+
+    Raises:
+        InputError: the metadata are missing, too large or damaged.
+    """
+    import zarr
+
+    where = folder / name / "zarr.json"
+    check_file(where, what)
+    check_size(where, MOST_UNPACKED)
+    with reading(where, what):
+        store = zarr.storage.LocalStore(folder, read_only=mode == "r")
+        return zarr.open_array(store=store, path=name, mode=mode, zarr_format=3)
+
+
 def chunk_file(folder: Path, array: Any, place: tuple[int, ...]) -> Path:
     """The file of a chunk, given by its index along the first axes; the other axes have one chunk."""
     rest = (0,) * (len(array.shape) - len(place))

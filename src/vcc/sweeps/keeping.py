@@ -6,7 +6,6 @@ An image is on disk completely or not at all. Its entry in ``done`` and its numb
 from __future__ import annotations
 
 import os
-import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +21,14 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.base.reading import check_path, expanded, in_words, read_bytes, read_json, reading, value_at
 from vcc.base.version import VERSION
-from vcc.files.atomic import refusal
-from vcc.files.parts import check_name, clear_leftovers, part_of
+from vcc.files.atomic import atomic_folder, check_parent, refusal
+from vcc.files.parts import check_name, clear_leftovers
 from vcc.files.writer_lock import WriterLock
-from vcc.store.attributes import difference, plain, same
+from vcc.store.attributes import check_version, difference, plain, same
+from vcc.store.zarr_chunks import opened_array
 from vcc.sweeps.metrics import KNOWN
 from vcc.sweeps.result import PIXEL_AXES, Results, Sweep
-from vcc.sweeps.stored import StoredPictures, member, small
+from vcc.sweeps.stored import SWEEP, StoredPictures, small
 from vcc.sweeps.values import Varied
 
 KEY = "sweep"
@@ -76,8 +76,7 @@ class InStore(Results):
         super().__init__(swept)
         self.path = Path(path).expanduser()
         check_name(self.path)
-        if not self.path.parent.is_dir():
-            raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
+        check_parent(self.path)
         stated = None if description is None else plain({**description, "pictures": picture}, "description")
         there = os.path.lexists(self.path)
         if there:
@@ -89,7 +88,7 @@ class InStore(Results):
                 _make(self.path, swept, picture, stated, metrics)
             for left in self.path.rglob("*.partial"):  # left by a killed run
                 left.unlink(missing_ok=True)
-            self._group = _opened(self.path, "r+")
+            self._group = _opened(self.path)
             self._pictures: Any = None if picture is None else self._group[PICTURES]
             self._take_over(metrics)
         except BaseException:
@@ -143,7 +142,7 @@ class InStore(Results):
     def _take_over(self, metrics: dict[str, str | None]) -> None:
         """Load the results of the same sweep, and create arrays for metrics that are new or have changed."""
         there = _stated(self.path)["metrics"]
-        self.swept.done[...] = small(self.path, self._group, DONE, self.swept.shape)
+        self.swept.done[...] = small(self.path, DONE, self.swept.shape)
         wanted = {name: metric for name, metric in metrics.items() if there.get(name, "") != metric}
         if wanted and self._pictures is None and self.swept.done.any():
             raise InputError(
@@ -159,7 +158,7 @@ class InStore(Results):
             # Written last: after a kill before this point, the metrics still count as missing.
             self._group.attrs[KEY] = {**self._group.attrs[KEY], "metrics": {**there, **metrics}}
         shape = self.swept.shape
-        numbers = {name: small(self.path, self._group, name, shape) for name in (*KNOWN, *there, *wanted)}
+        numbers = {name: small(self.path, name, shape) for name in (*KNOWN, *there, *wanted)}
         self.swept = replace(self.swept, numbers=numbers)
 
     def _note(self) -> None:
@@ -191,7 +190,6 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
     folder = expanded(path)
     with reading(folder, "a sweep"):
         stated = _stated(folder)
-        group = _opened(folder, "r")
         axes, parameters = tuple(stated["axes"]), stated["parameters"]
         together = axes != tuple(each["name"] for each in parameters)
         sizes = [len(each["labels"]) for each in parameters]
@@ -201,28 +199,28 @@ def open_sweep(path: str | PathLike[str]) -> Sweep:
         coordinates = tuple(
             Varied(
                 each["name"],
-                tuple(small(folder, group, each["name"], (size,)).tolist()),
+                tuple(small(folder, each["name"], (size,)).tolist()),
                 tuple(each["labels"]),
                 each["unit"],
             )
             for each, size in zip(parameters, sizes, strict=True)
         )
-        frames = small(folder, group, FRAME, (3, 3), (*shape, 3, 3))
+        frames = small(folder, FRAME, (3, 3), (*shape, 3, 3))
         if not np.isfinite(frames).all():
             raise InputError(f"{folder / FRAME} holds numbers that are not finite")
         return Sweep(
             axes,
             coordinates,
-            {name: small(folder, group, name, shape) for name in (*KNOWN, *stated["metrics"])},
-            _pictures_of(folder, group, shape) if (folder / PICTURES).is_dir() else None,
+            {name: small(folder, name, shape) for name in (*KNOWN, *stated["metrics"])},
+            _pictures_of(folder, shape) if (folder / PICTURES).is_dir() else None,
             frames,
-            small(folder, group, DONE, shape),
+            small(folder, DONE, shape),
         )
 
 
-def _pictures_of(folder: Path, group: Any, shape: tuple[int, ...]) -> StoredPictures:
+def _pictures_of(folder: Path, shape: tuple[int, ...]) -> StoredPictures:
     """The images of a sweep, one per chunk; the shape is checked."""
-    array, n = member(folder, group, PICTURES), len(shape)
+    array, n = opened_array(folder, PICTURES, SWEEP), len(shape)
     one = (*(1,) * n, *array.shape[n:])
     if tuple(array.shape[:n]) != shape or tuple(array.chunks) != one or len(one) - n not in (2, 3):
         raise InputError(
@@ -264,24 +262,20 @@ def _stated(folder: Path) -> dict[str, Any]:
         raise InputError(f"{folder} is no sweep: it {'is a file' if folder.is_file() else 'holds no zarr.json'}")
     stated = read_json(read_bytes(folder / "zarr.json"), f"{folder / 'zarr.json'}")
     found = value_at(stated, "attributes", KEY)
-    if not isinstance(found, dict) or not isinstance(found.get("format_version"), int):
+    if not isinstance(found, dict):
         raise InputError(f'{folder} is a Zarr group, and no sweep: its attributes have no "{KEY}"')
-    if found["format_version"] > FORMAT_VERSION:
-        raise InputError(
-            f"{folder} has format_version {found['format_version']}, and this vcc reads up to {FORMAT_VERSION}: "
-            "use a newer vcc"
-        )
+    check_version(folder, found.get("format_version"), FORMAT_VERSION)
     if not isinstance(found.get("metrics"), dict):
         raise InputError(f"{folder} cannot be used as a sweep: it does not state its metrics")
     return found
 
 
-def _opened(folder: Path, mode: Literal["r", "r+"]) -> Any:
+def _opened(folder: Path) -> Any:
+    """The group, for writing."""
     import zarr
 
     try:
-        store = zarr.storage.LocalStore(folder, read_only=mode == "r")
-        return zarr.open_group(store=store, mode=mode, zarr_format=3)
+        return zarr.open_group(store=zarr.storage.LocalStore(folder), mode="r+", zarr_format=3)
     except Exception as error:
         raise InputError(f"{folder} cannot be used as a sweep: {in_words(error)}") from error
 
@@ -312,8 +306,7 @@ def _make(
     """Create the group and its arrays under a temporary name, and rename it when complete."""
     import zarr
 
-    part = part_of(folder)
-    try:
+    with atomic_folder(folder) as part:
         group = zarr.create_group(
             zarr.storage.LocalStore(part), attributes={KEY: _statement(swept, description, metrics)}
         )
@@ -335,11 +328,6 @@ def _make(
         if picture is not None and values is not None:
             for place in np.ndindex(*swept.shape):
                 made[place] = values[place]
-        part.replace(folder)
-    except OSError as error:
-        raise InputError(f"{folder} cannot be made: {refusal(error, part)}") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def _statement(swept: Sweep, description: dict[str, Any] | None, metrics: dict[str, str | None]) -> dict[str, Any]:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
-from vcc.base.reading import MOST_UNPACKED, check_file, reading
-from vcc.store.zarr_chunks import check_size, chunk_file, read_array
+from vcc.base.reading import reading
+from vcc.store.zarr_chunks import chunk_file, opened_array, read_array
 
 SWEEP = "an array of a sweep"
 
@@ -75,20 +75,7 @@ class StoredPictures:
         return read_array(self.folder, self.array, index, places, SWEEP)
 
 
-def member(folder: Path, group: Any, name: str) -> Any:
-    """The Zarr array of that name; its values are not read yet.
-
-    Raises:
-        InputError: it does not exist, or its metadata is invalid.
-    """
-    where = folder / name / "zarr.json"
-    check_file(where)
-    check_size(where, MOST_UNPACKED)
-    with reading(where, SWEEP):
-        return group[name]
-
-
-def small(folder: Path, group: Any, name: str, *shapes: tuple[int, ...]) -> NDArray[Any]:
+def small(folder: Path, name: str, *shapes: tuple[int, ...]) -> NDArray[Any]:
     """The values of a small array, which has one chunk.
 
     Args:
@@ -100,7 +87,7 @@ def small(folder: Path, group: Any, name: str, *shapes: tuple[int, ...]) -> NDAr
     Raises:
         InputError: as `member`; another shape; a file that is damaged or too large for the array.
     """
-    array = member(folder, group, name)
+    array = opened_array(folder, name, SWEEP)
     with reading(folder / name, SWEEP):
         if tuple(array.shape) not in shapes or tuple(array.chunks) != tuple(array.shape):
             raise InputError(

@@ -17,7 +17,7 @@ from vcc.base import checks
 from vcc.base.describe import Brief
 from vcc.base.errors import InputError
 from vcc.base.memory import check_memory
-from vcc.base.notices import Notices
+from vcc.base.notices import Notices, worked_elsewhere
 from vcc.base.progress import Progress, tell
 from vcc.camera import Camera, each_captured
 from vcc.fields.samples import Samples, check_is_light_field
@@ -287,9 +287,5 @@ def rows_of(
 
 def rows_elsewhere(shared: tuple[Work, int], batch: Sequence[int]) -> tuple[Rows, Notices]:
     """The same as a task; also returns the warnings, unless it runs in the requesting process."""
-    (work, asking), remarks = shared, Notices()
-    if os.getpid() == asking:
-        return list(rows_of(work, batch)), remarks
-    with remarks.gathered():
-        rows = list(rows_of(work, batch))
-    return rows, remarks
+    work, asking = shared
+    return worked_elsewhere(lambda: list(rows_of(work, batch)), asking)

@@ -20,7 +20,7 @@ from vcc.base.progress import Progress, tell
 from vcc.base.reading import check_path, expanded, read_bytes, read_json, reading, value_at
 from vcc.base.values import fingerprint
 from vcc.base.version import VERSION
-from vcc.files.atomic import refusal
+from vcc.files.atomic import check_parent, refusal
 from vcc.files.parts import check_name, clear_folder, part_of
 from vcc.files.writer_lock import WriterLock
 from vcc.run.executors import Work, worker_pool
@@ -292,8 +292,7 @@ class Store:
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = expanded(path)
         check_name(self.path)
-        if not self.path.parent.is_dir():
-            raise InputError(f"{self.path} cannot be made: there is no folder {self.path.parent}; make it first")
+        check_parent(self.path)
         if os.path.lexists(self.path):
             stated(self.path)
         self._lock = WriterLock(self.path)

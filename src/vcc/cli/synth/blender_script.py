@@ -33,6 +33,10 @@ def blender_script(
 ) -> None:
     """Write a script that renders the views in your own Blender, 3.6 to 5.x, and states their geometry.
 
+    Examples:
+        vcc synth blender-script -o views.py --views 9 9 --aperture "40 mm"
+        blender scene.blend --background --python views.py
+
     Args:
         output: The script to write.
         folder: Folder for the views; relative to the .blend file.

@@ -60,10 +60,15 @@ def depth(
     output: Store,
     where: ViewsOfPicture = ViewsOfPicture(),
     reading: ReadingDepth = ReadingDepth(),
-    by: RenderedBy = RenderedBy(),
+    executor: RenderedBy = None,
     dtype: SampleType = "float16",
 ) -> None:
     """Make the views around a picture from its depth; hidden parts behind edges are filled in.
+
+    Examples:
+        vcc synth depth room.png room-depth.exr -o room.zarr --field-of-view "60 deg"
+        vcc synth depth kinect.png kinect-depth.png -o out.zarr --depth-unit "1 mm"
+        vcc synth depth view.png disparity.pfm -o out.zarr --meaning disparity --focus-distance "4 m"
 
     Args:
         picture: The middle view.
@@ -88,7 +93,7 @@ def depth(
         middle = 2 / (1 / distances.min() + 1 / distances.max())
         cameras = where.cameras(pixels=pixels, focus_distance=float(middle))
         scene = DepthMapScene.for_cameras(radiance, distances, cameras)
-    make(scene, cameras, output, dtype, by)
+    make(scene, cameras, output, dtype, executor)
     corner = scene.uncovered(cameras.camera(0, 0))
     show(f"{float(corner.mean()):.1%} of the corner view was filled in: behind edges and beyond the border")
 

@@ -36,6 +36,10 @@ def mitsuba(
 ) -> None:
     """Render any scene of Mitsuba 3. Its own sensor defines the position and direction of the middle view.
 
+    Examples:
+        vcc synth mitsuba scene.xml -o out.zarr --views 20 20 --pixels 500 500 --aperture "20 mm" --field-of-view
+            "40 deg" --focus-distance "1.3 m" --samples 64
+
     Args:
         scene: A scene of Mitsuba 3, .xml.
         set: A value for $NAME in the scene's file. May be given more than once.

@@ -107,6 +107,10 @@ def opengl(
 ) -> None:
     """Draw meshes with OpenGL, textured and simply lit: fast, without shadows, mirrors and glass.
 
+    Examples:
+        vcc synth opengl teapot.glb -o teapot.zarr --field-of-view "40 deg"
+        vcc synth opengl room.obj -o room.zarr --unit "1 cm" --eye "0, 160, 300" --target "0, 100, 0"
+
     Args:
         mesh: Files .glb, .gltf, .obj or .ply, in one scene.
         background: Linear radiance of the background.

@@ -23,6 +23,9 @@ def pbrt(
 ) -> None:
     """Render a scene of PBRT by the program pbrt (on the PATH, or named by PBRT in the environment).
 
+    Examples:
+        vcc synth pbrt scene.pbrt -o out.zarr --views 9 9 --pixels 400 600 --samples 128
+
     Args:
         scene: A scene of PBRT version 4, .pbrt.
         samples: Paths per pixel. Default: from the scene's sampler.

@@ -1,19 +1,15 @@
 """``vcc synth planes``: pictures on planes."""
 
-import math
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 from cyclopts import Parameter
-from numpy.typing import NDArray
 
 from vcc.base.errors import InputError
 from vcc.base.units import deg, parse
 from vcc.cli.synth.rendering import Angle, SampleType, Store, ViewsAndPixels, check_store, make
-from vcc.light_field import LightField
 from vcc.showcase.scene import demo_scene
-from vcc.sources import CameraArray, PlanesScene, TexturedPlane, ViewCamera
+from vcc.sources import PlanesScene, TexturedPlane
 from vcc.sources.textures import Picture
 
 
@@ -33,47 +29,17 @@ def planes(
 ) -> None:
     """Render pictures on planes, the nearer ones before the others.
 
+    Examples:
+        vcc synth planes -o leaves.zarr
+        vcc synth planes -o two.zarr --plane "leaf.png, 0.8 m, 30 cm" --plane "town.jpg, 3 m, 2 m"
+
     Args:
         plane: A picture on a plane that faces the camera, centred on the axis; transparent where a PNG is.
             May be given more than once. Default: the demo's scene, leaves before a test chart before a town.
     """
     output, cameras = check_store(output), where.cameras()
     scene = PlanesScene([_plane(text) for text in plane]) if plane else demo_scene()
-    make(_PlanesAtOnce(scene, cameras, dtype), cameras, output, dtype)
-
-
-class _PlanesAtOnce:
-    """A scene of planes whose views are all rendered at the first request: a hundred times as fast.
-
-    If the spacings down and across differ, `PlanesScene.light_field` does not apply, and views are rendered
-    singly.
-    """
-
-    def __init__(self, scene: PlanesScene, cameras: CameraArray, dtype: str) -> None:
-        self._scene = scene
-        self._cameras = cameras
-        self._dtype = dtype if dtype.startswith("uint") else "float32"
-        self._made: LightField | None = None
-
-    def description(self) -> dict[str, Any]:
-        return self._scene.description()
-
-    def render(self, camera: ViewCamera) -> NDArray[np.float32]:
-        (dv, du), (_, slope) = self._cameras.spacings, self._cameras.slopes_per_pixel
-        if not math.isclose(dv, du, rel_tol=1e-9):
-            return self._scene.render(camera)
-        if self._made is None:
-            self._made = self._scene.light_field(
-                self._cameras.views,
-                self._cameras.pixels,
-                spacing=du,
-                slope_per_pixel=slope,
-                focus_distance=self._cameras.focus_distance,
-                dtype=self._dtype,
-            )
-        samples: NDArray[np.float32] = self._made.values[camera.row, camera.column].astype("float32")
-        samples /= self._made.full_scale
-        return samples
+    make(scene, cameras, output, dtype)
 
 
 def _plane(text: str) -> TexturedPlane:

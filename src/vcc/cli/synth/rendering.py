@@ -11,11 +11,11 @@ from typing import Annotated, Any, Literal
 from cyclopts import Group, Parameter
 
 from vcc.base import checks
-from vcc.base.errors import InputError
 from vcc.base.units import deg, mm, parse, short
 from vcc.cli.console import progress, show
-from vcc.cli.executing import Executing, Who
+from vcc.cli.executing import Who, opened
 from vcc.cli.options import Counts, Length, Lengths, Whole, quantity
+from vcc.files.atomic import check_parent
 from vcc.sources import CameraArray, Renderer, synthesize
 
 WHERE = Group("Where the views are", sort_key=2)
@@ -42,6 +42,15 @@ SampleType = Annotated[
 ]
 Samples = Annotated[Whole, Parameter(group=HOW, help="Paths per pixel.")]
 Seed = Annotated[Whole, Parameter(group=HOW, help="Of the noise: the same seed gives the same views.")]
+RenderedBy = Annotated[
+    Who,
+    Parameter(
+        group=HOW,
+        help="What renders the views, some in each task: `processes` or `threads`, one per core of this machine, "
+        'or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread. Default: one view '
+        "after the other, on all cores.",
+    ),
+]
 Variant = Annotated[
     str,
     Parameter(
@@ -95,23 +104,6 @@ class ViewsAndPixels(Views):
     pixels: Counts = (500, 500)
 
 
-@Parameter(name="*", group=HOW)
-@dataclass(frozen=True, kw_only=True)
-class RenderedBy(Executing):
-    """The executor that renders the views.
-
-    Args:
-        executor: What renders the views, some in each task: `processes` or `threads`, one per core of this
-            machine, or a Dask cluster by its scheduler, "dask://host:8786". Each task uses one thread. Default:
-            one view after the other, on all cores.
-    """
-
-    executor: Who = None
-
-    def __post_init__(self) -> None:
-        self.check_name()
-
-
 def check_store(path: Path) -> Path:
     """Check that a store can be written at this path, before a scene is loaded.
 
@@ -120,22 +112,19 @@ def check_store(path: Path) -> Path:
     """
     path = path.expanduser()
     checks.ending("a store", path, ".zarr")
-    if not path.parent.is_dir():
-        raise InputError(f"{path} cannot be written: there is no folder {path.parent}; make it first")
+    check_parent(path)
     return path
 
 
-def make(
-    renderer: Renderer, cameras: CameraArray, output: Path, dtype: str, by: RenderedBy = RenderedBy()
-) -> None:
+def make(renderer: Renderer, cameras: CameraArray, output: Path, dtype: str, executor: str | None = None) -> None:
     """Render all views into a store, with a progress bar, and print a summary.
 
     Raises:
         InputError: see `synthesize`.
     """
     try:
-        with by.opened() as executor, progress("Rendering views") as advance:
-            made = synthesize(renderer, cameras, output, dtype=dtype, executor=executor, progress=advance)
+        with opened(executor) as running, progress("Rendering views") as advance:
+            made = synthesize(renderer, cameras, output, dtype=dtype, executor=running, progress=advance)
     finally:
         close = getattr(renderer, "close", None)
         if close is not None:

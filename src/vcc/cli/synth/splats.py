@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from vcc.base.errors import InputError
 from vcc.base.units import short
 from vcc.cli.console import DRAWINGS, check_output, progress, save_figure, show
-from vcc.cli.options import Counts, Length, Lengths, Whole, above_zero, quantity
+from vcc.cli.options import Counts, File, Length, Lengths, Number, Whole
 from vcc.cli.synth.opengl import Colour, Position
 from vcc.cli.synth.rendering import (
     HOW,
@@ -26,8 +26,6 @@ from vcc.formats.poses import PosedCamera, read_poses
 from vcc.sources import CameraArray, Viewpoint
 from vcc.sources.splats import Splats, SplatScene, read_splats
 from vcc.sources.splats.looking import arranged, cameras_around, contact_sheet, seen, viewpoint_of
-
-Number = Annotated[float, quantity("NUMBER", above_zero)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +73,7 @@ class Standing:
         up: The upward direction in the views, with --eye. Default: −y for .ply and .splat, y for others.
     """
 
-    camera_from: Annotated[Path | None, Parameter(metavar="FILE")] = None
+    camera_from: File | None = None
     camera: Whole = 0
     eye: Position | None = None
     target: Position | None = None
@@ -136,10 +134,18 @@ def splats(
     where: ViewsOfSplats = ViewsOfSplats(),
     standing: Standing = Standing(),
     drawing: Drawing = Drawing(),
-    by: RenderedBy = RenderedBy(),
+    executor: RenderedBy = None,
     dtype: SampleType = "float16",
 ) -> None:
     """Render Gaussian splats: true views with occlusion, and the disparities of the middle one.
+
+    --look lists cameras of the scene and draws a contact sheet of what they see.
+
+    Examples:
+        vcc synth splats room.ply --look
+        vcc synth splats room.ply -o room.zarr --camera 3 --parallax 1
+        vcc synth splats garden.ply -o garden.zarr --camera-from cameras.json --camera 12 --views 9 9
+        vcc synth splats garden.ply views.toml -o garden.zarr --executor processes
 
     Args:
         splats: A file .ply, .splat, .spz or .glb.
@@ -165,7 +171,7 @@ def splats(
     focus = cameras.focus_distance
     converge = "parallel views" if focus == float("inf") else f"views converge at {short(focus, digits=3)}"
     show(f"{converge}, {short(cameras.spacings[1], digits=3)} apart")
-    make(scene, cameras, output, dtype, by)
+    make(scene, cameras, output, dtype, executor)
 
 
 def show_left_out(scene: SplatScene, way_out: str = "") -> None:

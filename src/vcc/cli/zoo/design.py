@@ -1,19 +1,16 @@
 """``vcc zoo design``: learn a code and a decoder together, and decoders for its controls."""
 
-from pathlib import Path
-from typing import Annotated, Literal
-
-from cyclopts import Parameter
+from typing import Literal
 
 from vcc.base import lazy_import
 from vcc.cli.console import progress, show
-from vcc.cli.options import Whole
+from vcc.cli.options import OutputFolder, Whole
 
 
 def design(
     *,
     task: str,
-    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")],
+    output: OutputFolder,
     light: float = 0.25,
     cells: Whole = 14,
     feature: Whole = 2,
@@ -24,7 +21,15 @@ def design(
     scenes: Whole = 32,
     validation: Whole = 4,
 ) -> None:
-    """Learn an aperture code and a decoder together, and decoders for its controls.
+    """Learn an aperture code and its decoder together, and decoders of its controls: the round stop of its
+    light, a random code, and the open square.
+
+    The code can be made: it is binary and symmetric, and has an exact number of open cells and no smaller
+    hole or bar than stated. The same command resumes an interrupted design. vcc zoo run scores it.
+
+    Examples:
+        vcc zoo design --task edof -o design
+        vcc zoo design --task edof -o design --light 0.1 --symmetry left-right --seeds 5
 
     Args:
         task: edof: a picture all in focus.

@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from vcc.cli.console import make_folder, show
+from vcc.cli.options import OutputFolder
 from vcc.zoo import Report
 
 
@@ -14,9 +15,12 @@ def page(
     /,
     *,
     task: str = "edof",
-    output: Annotated[Path, Parameter(alias="-o", metavar="FOLDER")] = Path("vcc-zoo"),
+    output: OutputFolder = Path("vcc-zoo"),
 ) -> None:
     """Write a page of a run: tables, quality over light, and a strip of pictures.
+
+    Examples:
+        vcc zoo page zoo.zarr -o page
 
     Args:
         task: Of the run.

@@ -6,8 +6,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from vcc.cli.console import progress, show
-from vcc.cli.executing import Executing, Who
-from vcc.cli.options import MAKING, Output, Whole
+from vcc.cli.executing import Who, opened
+from vcc.cli.options import Output, Whole
 from vcc.zoo import run as run_zoo
 from vcc.zoo.scenes import BUILT_IN
 
@@ -23,9 +23,18 @@ def run(
     camera: Annotated[tuple[Path, ...], Parameter(metavar="FILE"), Many] = (),
     decoder: Annotated[tuple[str, ...], Parameter(metavar="FILE.py:FUNCTION"), Many] = (),
     without: Annotated[tuple[str, ...], Parameter(metavar="NAME"), Many] = (),
-    executor: Annotated[Who, Parameter(group=MAKING)] = None,
+    executor: Who = None,
 ) -> None:
-    """Score cameras, scenes and decoders, except those whose results are in the store already.
+    """Score cameras, scenes and decoders for a task, with controls of the same light.
+
+    Results are kept by content: the same command resumes an interrupted run, and a new camera or decoder adds
+    only its own results.
+
+    Examples:
+        vcc zoo run --task edof -o zoo.zarr
+        vcc zoo run --task edof -o zoo.zarr --camera my.toml --decoder my.py:decode
+        vcc zoo run --task light-field -o zoo.zarr --seeds 3
+        vcc zoo run --task depth -o zoo.zarr --scene leaves-7 --scene views.zarr --executor processes
 
     Args:
         task: edof: a picture all in focus. depth: the distance of each pixel. light-field: 5×5 views. refocusing:
@@ -40,9 +49,7 @@ def run(
         executor: What runs the trials: `processes` or `threads`, one per core of this machine, or a Dask cluster
             by its scheduler, "dask://host:8786". Default: one after the other.
     """
-    executing = Executing(executor=executor)
-    executing.check_name()
-    with executing.opened() as opened, progress("Scoring") as advance:
+    with opened(executor) as running, progress("Scoring") as advance:
         made = run_zoo(
             task,
             output,
@@ -51,7 +58,7 @@ def run(
             cameras=camera,
             own_decoders=decoder,
             without=without,
-            executor=opened,
+            executor=running,
             progress=advance,
         )
     show(f"{output}: {made} new results of the task {task}; vcc zoo table {output} --task {task} shows them all")

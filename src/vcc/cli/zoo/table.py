@@ -6,6 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from vcc.cli.console import check_output, show
+from vcc.cli.options import Output
 from vcc.sweeps.table import ENDINGS
 from vcc.zoo import Report
 
@@ -15,9 +16,13 @@ def table(
     /,
     *,
     task: str = "edof",
-    output: Annotated[Path | None, Parameter(alias="-o", metavar="FILE")] = None,
+    output: Output | None = None,
 ) -> None:
-    """Print the table of a run as Markdown, with standard errors and the gains over controls.
+    """Print the table of a run, with standard errors over scenes and the gains over controls.
+
+    Examples:
+        vcc zoo table zoo.zarr
+        vcc zoo table zoo.zarr --task depth -o scores.csv
 
     Args:
         task: Of the run.

@@ -293,11 +293,11 @@ def _mixed(share: NDArray[Any], low: Colour, high: Colour) -> NDArray[np.float32
     return np.asarray(np.array(low) + share[..., None] * (np.array(high) - np.array(low)), dtype=np.float32)
 
 
-def _noise(x: NDArray[Any], y: NDArray[Any], seed: int, octaves: int = 5) -> NDArray[Any]:
+def _noise(x: NDArray[Any], y: NDArray[Any], seed: int) -> NDArray[Any]:
     """Waves in random directions with amplitude falling with frequency, about −1 to 1."""
     random = np.random.default_rng(seed)
     total = np.zeros_like(x)
-    for octave in range(octaves):
+    for octave in range(5):
         for _ in range(4):
             angle, phase = random.uniform(0, 2 * math.pi, 2)
             along = x * math.cos(angle) + y * math.sin(angle)
