@@ -468,7 +468,7 @@ def main() -> None:
     arguments = parser.parse_args()
     wanted = [case for case in cases() if arguments.only in row(size_of(case), case.name)]
     if arguments.jupyterlab:
-        wanted = [replace(case, least=20, late=100) for case in wanted if case.views == 9]
+        wanted = [replace(case, least=20, late=100) for case in wanted if case.coarsest == 2]
     load, version = os.getloadavg()[0], platform.python_version()
     print(f"{platform.node()}: {os.cpu_count()} cores, load {load:.1f} at the start, Python {version}\n")
     with tempfile.TemporaryDirectory() as made:
