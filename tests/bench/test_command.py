@@ -23,7 +23,7 @@ def offered(monkeypatch):
         found.update(there=there, **how)
 
     monkeypatch.setattr(command, "run", kept)
-    monkeypatch.setattr(command, "_opened", lambda field: None)
+    monkeypatch.setattr(command, "_prepared", lambda offered: None)
     return found
 
 

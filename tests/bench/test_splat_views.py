@@ -115,7 +115,7 @@ def test_better_views_that_cannot_be_made_leave_the_coarse_ones():
 def test_the_command_opens_a_file_of_splats(tmp_path, monkeypatch):
     found = {}
     monkeypatch.setattr(command, "run", lambda there, **how: found.update(there=there))
-    monkeypatch.setattr(command, "_opened", lambda field: None)
+    monkeypatch.setattr(command, "_prepared", lambda offered: None)
     monkeypatch.chdir(tmp_path)
     write_ply(CLOUD, tmp_path / "balls.ply")
     done = run("bench", "balls.ply", "--eye", "0, 0, 0", "--target", "0, 0, 1", "--unit", "50 cm")

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from vcc.base.affine import Affine
 from vcc.base.errors import InputError
 from vcc.base.progress import Progress, tell
+from vcc.base.workers import Workers
 from vcc.bench.document import Document, shown
 from vcc.fields.sampled import to_numpy
 from vcc.files.camera_reading import Beside
 from vcc.light_field import LightField
+from vcc.plan.how import cores
 
 LONG = 0.2
 """Seconds after which waiting clients get their turn."""
@@ -201,8 +203,12 @@ def _halved(light_field: LightField) -> LightField:
     whole = values[:, :, : nt // rows * rows, : ns // columns * columns]
     shape = (nv, nu, nt // rows, ns // columns, *values.shape[4:])
     coarse = np.empty(shape, values.dtype if values.dtype.kind == "u" else np.float32)
-    for j, i in np.ndindex(nv, nu):  # one view at a time, to save memory
-        coarse[j, i] = _mean(whole[j, i], rows, columns, coarse.dtype)
+
+    def fill(view: tuple[int, ...]) -> None:
+        coarse[view] = _mean(whole[view], rows, columns, coarse.dtype)
+
+    with Workers(cores()) as pool:
+        list(pool.map(fill, np.ndindex(nv, nu)))  # view by view, to save memory
     to_fine = Affine.translation(0, 0, (columns - 1) / 2, (rows - 1) / 2) @ Affine.scaling(1, 1, columns, rows)
     found = light_field.measured_disparity_range()
     disparities = None if found is None else (found[0] / columns, found[1] / columns)

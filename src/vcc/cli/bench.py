@@ -14,7 +14,10 @@ from vcc.base.progress import Progress
 from vcc.base.units import short
 from vcc.bench.cameras import SCENE, cameras, scenes
 from vcc.bench.document import Document
+from vcc.bench.editing import Editing
+from vcc.bench.imaging import Imaging
 from vcc.bench.offered import Field, Offered
+from vcc.bench.picture import COARSER
 from vcc.bench.published import Gallery, title_of
 from vcc.bench.server import LOOPBACK, run
 from vcc.bench.splat_views import SplatViews
@@ -96,8 +99,7 @@ def bench(
     elif light_field is not None:
         fields = {name: _field(light_field, reading), **fields}
     offered = Offered(fields, start, beside, shown, presets(shown))
-    # Opens while the browser starts; a client that is faster waits for the same lock.
-    threading.Thread(target=_opened, args=(fields[name],), daemon=True).start()
+    threading.Thread(target=_prepared, args=(offered,), daemon=True).start()
     if run(offered, host=host, port=port, browser=not no_browser, say=show):
         raise SystemExit  # by Ctrl-C, without waiting for what other threads compute
 
@@ -134,6 +136,10 @@ def _splats(path: Path, standing: Standing, train: Train) -> tuple[Field, float]
     return views.field(str(path.expanduser().resolve())), float(f"{views.focus_distance:.4g}")
 
 
-def _opened(field: Field) -> None:
-    with contextlib.suppress(Exception):  # a client that needs it opens it again, and gets the error
-        field.whole()
+def _prepared(offered: Offered) -> None:
+    """Open the light field, and make a first image, which loads compiled code, while the browser starts.
+
+    A client that is faster waits for both.
+    """
+    with contextlib.suppress(Exception):  # a client that needs it tries again, and gets the error
+        Imaging(Editing(offered), lambda: None).take(COARSER[0])

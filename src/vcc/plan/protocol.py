@@ -220,8 +220,8 @@ class Engine(Protocol):
 
         Applies the operators' ``transpose``, the last operator first. Each is the adjoint of its operator on real
         numbers: rounding to integers and the scale of the integers are ignored. If 8-bit samples are stored as
-        16-bit integers, each of which stands for ``kept_as(kind)[1]`` of a sample's step, the caller divides by this
-        factor.
+        16-bit integers, each of which stands for ``kept_as(kind)[1]`` of a sample's step, the caller divides by
+        this factor.
 
         Args:
             before: the operators, in the order in which they are applied.
