@@ -455,7 +455,7 @@ OF_LOOP = (
     "views", "camera; what is dragged", "pictures/s (at least)", "input to picture, median, ms",
     "95th percentile (at most)", "longest", "coarsest, pixels in one along a side (at most)", "shares by size",
     "all pixels after the hand rests, ms (at most), and exact", "made in, while dragging",
-    "first picture after the page was asked for, s (at most)",
+    "first picture, from the start of loading the page, s (at most)",
 )  # fmt: skip
 
 
