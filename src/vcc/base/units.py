@@ -35,6 +35,8 @@ _UNITS: Final[dict[str, dict[str, float]]] = {
     "area squared": {"m4": m**4, "mm4": mm**4, "um4": um**4, "µm4": um**4, "μm4": um**4, "nm4": nm**4},
 }
 """The units read without pint: the factors of this module, so that "48 um" is 48 * um exactly."""
+NAMES: Final = tuple(name for units in _UNITS.values() for name in units)
+"""Of these units."""
 _WRITTEN: Final[dict[str, tuple[str, ...]]] = {
     "length": ("m", "mm", "um", "nm"),
     "angle": ("rad", "mrad", "deg"),

@@ -66,8 +66,8 @@ def uninterrupted(work: Callable[..., Result], /, *given: Any) -> Result:
     """Return the result of work in a separate thread, which is not interrupted; this thread waits.
 
     Python handles Ctrl-C and other signals only in its main thread. So their exceptions are never raised inside
-    a library that continues in threads of its own (Zarr): the interrupted work has
-    finished when the exception is raised here.
+    a library that continues in threads of its own (Zarr): the interrupted work has finished when the exception is
+    raised here.
 
     Args:
         work: called with the arguments.

@@ -81,15 +81,15 @@ class Imaging:
         Raises:
             InputError: see `vcc.bench.picture.take`.
         """
-        if self.taken is not None and not self.taken.coarse and self.is_shown():
-            return self.taken
+        if self.fineness_shown() == WHOLE:
+            return self.there()
         if wanted.moving and not self._moving:
             self._parts.clear()  # what was decided for the place at which an earlier drag ended
-        elif wanted.moving:
-            self._parts.pop(FULL, None)  # likewise, for the place at which the hand rested before
         self._moving = wanted.moving
         kind = self._kind()
         fineness = self._fineness(wanted, kind)
+        if fineness == FULL:
+            self._parts.pop(FULL, None)  # likewise, for the place of the one before
         taken = self.take(fineness)
         self._pace.noted(kind, fineness, taken)
         self.taken, self._of = taken, self._lit()
@@ -124,13 +124,9 @@ class Imaging:
             raise InputError("there is no image yet")
         return self.taken
 
-    def is_shown(self) -> bool:
-        """Whether the newest image is of the present document."""
-        return self.taken is not None and self._of == self._lit()
-
     def fineness_shown(self) -> Fineness | None:
         """Of the newest image, if it is of the present document."""
-        return self.taken.fineness if self.taken is not None and self.is_shown() else None
+        return self.taken.fineness if self.taken is not None and self._of == self._lit() else None
 
     def _lit(self) -> tuple[Document, Field]:
         """The document without what changes only how its image is shown, and its light field."""

@@ -101,10 +101,10 @@ class Pace:
                 for each in times.values():
                     each.recent = min(each.recent, each.least)
                 self._busy.clear()
-        for coarser, each in list(times.items()):  # compiling kernels delayed the first of a coarser kind
-            less = coarser.share(by_rays) < fineness.share(by_rays) or WHOLE == fineness != coarser
-            if less and each.recent > took:
-                del times[coarser]
+        for other, each in list(times.items()):
+            coarser = other != WHOLE if fineness == WHOLE else other.share(by_rays) < fineness.share(by_rays)
+            if coarser and each.recent > took:  # loading or compiling code delayed its first image
+                del times[other]
         self._kept[of] = by_rays, times
         if len(self._kept) > MOST_KINDS:
             del self._kept[next(iter(self._kept))]

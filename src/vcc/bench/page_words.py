@@ -2,9 +2,10 @@
 
 import re
 
+from vcc.base import units
 from vcc.files.toml_words import as_toml
 
-_UNIT = r"(?:[mnuµ]?m|cm|m?rad|deg|°|[muµ]?s)[24]?"
+_UNIT = f"(?:{'|'.join(units.NAMES)})"
 _QUANTITY = re.compile(rf'"([-+]?[\d.]+(?:e[-+]?\d+)? ?{_UNIT})"')
 _LIST = re.compile(rf"\[([^\[\]\"]*\d {_UNIT})\]")
 _NAME = re.compile(r"\"[^\"]*\"|\b[a-z]+(?:_[a-z]+)+\b(?!\()")

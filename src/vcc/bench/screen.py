@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vcc.base.errors import InputError
 from vcc.bench import messages
 from vcc.bench.document import shown
-from vcc.files.pictures import auto_exposure
+from vcc.files.pictures import auto_exposure, averaged
 from vcc.files.transfer import encode
 from vcc.optics.sensor import Sensor
 
@@ -161,9 +161,7 @@ def _colours(values: Picture) -> Picture:
 def thumbnail(values: Picture, white: float, most: int = 96) -> bytes:
     """A small JPEG: means over blocks of pixels, at most ``most`` along a side before the last rounding."""
     step = max(math.ceil(max(values.shape[:2]) / most), 1)
-    rows, columns = (size // step * step for size in values.shape[:2])
-    blocks = values[:rows, :columns].reshape(rows // step, step, columns // step, step, *values.shape[2:])
-    return jpeg(blocks.mean(axis=(1, 3), dtype=np.float32), white, coarse=True)
+    return jpeg(averaged(values, step), white, coarse=True)
 
 
 def histogram(values: Picture, white: float, look: Look = PLAIN) -> messages.Histogram:

@@ -31,7 +31,7 @@ from vcc.bench.inbox import CHANGES, MOST_WAITING, Inbox, turn_of
 from vcc.bench.messages import BenchDocument, PictureMessage, Side, StateMessage
 from vcc.bench.offered import Offered
 from vcc.bench.page_words import page_words
-from vcc.bench.picture import FULL, WHOLE, Taken
+from vcc.bench.picture import WHOLE, Taken
 from vcc.bench.pins import Pins
 from vcc.bench.screen import Look
 from vcc.bench.side import side
@@ -382,7 +382,7 @@ class Session:
         if document.views is not None and shown is not None and shown.whole().shape[:2] != now.whole().shape[:2]:
             self._editing.put(replace(document, views=None))  # they were counted among fewer views
         self._tell_state(self._turn)
-        self._wanted = Wanted(self._turn, moving=False, shown=FULL)
+        self._wanted = Wanted(self._turn, moving=False, shown=WHOLE)
 
     def _finish(self) -> None:
         """Put better light fields in the place of a coarse one, before a result that lasts."""
